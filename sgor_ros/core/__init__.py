@@ -1,0 +1,1 @@
+"""The method: numpy arrays in, result objects out. No ROS, no printing."""

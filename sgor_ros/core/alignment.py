@@ -1,0 +1,77 @@
+"""Local refinement on the clouds by GICP, and the covariance that follows (beyond the paper)."""
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+import small_gicp
+
+from .config import SgorConfig
+
+NEIGHBOURS = 10
+"""Points behind each local covariance of GICP."""
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """A thinned cloud with local covariances and its search tree, as small_gicp wants them."""
+
+    cloud: small_gicp.PointCloud
+    tree: small_gicp.KdTree
+
+
+@dataclass(frozen=True, eq=False)
+class Alignment:
+    """What GICP arrived at.
+
+    Attributes
+    ----------
+    T_target_source : (4, 4) float64
+    covariance : (6, 6) float64 or None
+        Of (x, y, z, rotation about x, y, z) in the target frame, m^2 and rad^2; None where a
+        direction is not observed at all.
+    converged : bool
+    pairs : int
+        Points that found a partner.
+    """
+
+    T_target_source: NDArray[np.float64]
+    covariance: NDArray[np.float64] | None
+    converged: bool
+    pairs: int
+
+
+def surface(points: NDArray[np.float32], voxel_size: float, threads: int) -> Surface | None:
+    """Thin (N, 3) points and estimate local covariances; None with too few points for them."""
+    if len(points) < NEIGHBOURS:
+        return None
+    cloud, tree = small_gicp.preprocess_points(
+        points.astype(np.float64), downsampling_resolution=voxel_size,
+        num_neighbors=NEIGHBOURS, num_threads=threads)
+    return Surface(cloud, tree) if cloud.size() >= NEIGHBOURS else None
+
+
+def align(source: Surface, target: Surface, T_target_source: NDArray[np.float64],
+          config: SgorConfig) -> Alignment:
+    """Refine a transformation by GICP from a good first guess."""
+    result = small_gicp.align(
+        target.cloud, source.cloud, target.tree, T_target_source, registration_type='GICP',
+        max_correspondence_distance=config.local_reach, num_threads=config.threads,
+        max_iterations=30)
+    T = np.asarray(result.T_target_source)
+    return Alignment(T, _covariance(result, T), bool(result.converged), int(result.num_inliers))
+
+
+def _covariance(result: small_gicp.RegistrationResult,
+                T: NDArray[np.float64]) -> NDArray[np.float64] | None:
+    hessian, pairs = np.asarray(result.H), int(result.num_inliers)
+    if pairs <= 6 or np.linalg.cond(hessian) > 1e12:
+        return None
+    # GICP's errors are Mahalanobis: their mean square scales the inverse Hessian
+    local = np.linalg.inv(hessian) * (2.0 * result.error / (3 * pairs - 6))
+    # from (rotation, translation) on the right of T to (translation, rotation) on its left
+    R, t = T[:3, :3], T[:3, 3]
+    skew = np.array([[0, -t[2], t[1]], [t[2], 0, -t[0]], [-t[1], t[0], 0]])
+    to_target = np.zeros((6, 6))
+    to_target[:3, 3:] = R
+    to_target[3:, :3] = R
+    return to_target @ local @ to_target.T

@@ -1,0 +1,53 @@
+"""Arrays at the door: the right shape and type, or an error that names the field."""
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+from numpy.typing import NDArray
+
+from .settings import InputError
+
+
+def as_points(points: ArrayLike, name: str, dtype: Any = np.float64) -> NDArray[Any]:
+    """Return (N, 3) numbers of a type, or say what is wrong with `name`.
+
+    Raises
+    ------
+    InputError
+    """
+    try:
+        array = np.asarray(points).astype(dtype, copy=False)
+    except (TypeError, ValueError) as error:
+        raise InputError(f'{name}: not an array of numbers: {error}') from error
+    if array.ndim != 2 or array.shape[1] != 3:
+        raise InputError(f'{name}: expected an (N, 3) array, got shape {array.shape}')
+    return array
+
+
+def as_labels(labels: ArrayLike, length: int, name: str) -> NDArray[np.int64]:
+    """Return (N,) integer labels, or say what is wrong with `name`.
+
+    Raises
+    ------
+    InputError
+    """
+    array = np.asarray(labels)
+    if array.shape != (length,):
+        raise InputError(f'{name}: expected one a point, ({length},), got shape {array.shape}')
+    if not np.issubdtype(array.dtype, np.integer):
+        raise InputError(f'{name}: expected integers, got {array.dtype}')
+    return array.astype(np.int64, copy=False)
+
+
+def finite_points(points: ArrayLike, name: str) -> NDArray[np.float64]:
+    """Return (N, 3) float64 points, or say what is wrong with `name`.
+
+    Raises
+    ------
+    InputError
+    """
+    array = as_points(points, name)
+    bad = np.flatnonzero(~np.isfinite(array).all(axis=1))
+    if bad.size:
+        raise InputError(f'{name}: row {bad[0]} is not finite: {array[bad[0]]}')
+    return array

@@ -1,0 +1,139 @@
+"""The settings of SGOR: one home for each default, with unit, meaning and bounds."""
+from dataclasses import dataclass
+import math
+from typing import Self
+
+from .settings import InputError
+from .settings import setting
+from .settings import Settings
+
+
+@dataclass(frozen=True)
+class SgorConfig(Settings):
+    """Settings of preprocessing and registration; ``SgorConfig()`` is the outdoor preset.
+
+    Where the paper prints no value (all radii and sizes), the defaults were measured; see
+    ``docs/method.md``.
+    """
+
+    # scan -> semantic-geometric space (Sec. III-B)
+    label_convention: str = setting(
+        'semantickitti', 'What the label ids mean: semantickitti, semantickitti_train, nuscenes '
+        'or the path of a YAML file')
+    min_range: float = setting(
+        1.0, 'Points nearer to the sensor are dropped', 'm', minimum=0.0, maximum=100.0)
+    max_range: float = setting(
+        80.0, 'Points farther from the sensor are dropped', 'm', minimum=0.5, maximum=1000.0)
+    voxel_size: float = setting(
+        0.5, 'Edge of the voxel grid that thins a scan', 'm', minimum=0.01, maximum=10.0)
+
+    # secondary ground segmentation (Sec. III-B, Eq. 2-3)
+    sigma_g: float = setting(
+        0.25, 'Points nearer to the ground plane are ground', 'm', minimum=0.005, maximum=5.0)
+    secondary_ground: bool = setting(
+        True, 'Segment the ground a second time by distance; false: by labels only (ablation 3)')
+    robust_ground: bool = setting(
+        True, 'Fit the ground plane in narrowing bands, nearest the sensor; false: as printed')
+    ground_radius: float = setting(
+        25.0, 'Horizontal reach of the ground plane fit when robust_ground is on', 'm',
+        minimum=1.0, maximum=1000.0)
+    min_ground_points: int = setting(
+        50, 'With fewer voxels there is no ground plane', minimum=3, maximum=100000)
+
+    # features and correspondences (Sec. III-B)
+    correspondence_preprocessing: bool = setting(
+        True, 'Leave out ground and classes that only one scan has; false: ablation 1')
+    drop_ground_labels: bool = setting(
+        True, 'Leave ground labels off the plane out of matching too (beyond the paper)')
+    normal_radius: float = setting(
+        1.5, 'Neighbourhood of a normal', 'm', minimum=0.01, maximum=20.0)
+    descriptor_radius: float = setting(
+        3.5, 'Neighbourhood of an FPFH descriptor', 'm', minimum=0.02, maximum=50.0)
+    vote_radius: float = setting(
+        1.0, 'Neighbourhood of the regional label vote', 'm', minimum=0.0, maximum=20.0)
+    max_correspondences: int = setting(
+        8000, 'More are thinned evenly', minimum=10, maximum=50000)
+    match_within_labels: bool = setting(
+        True, 'Match only points of the same regional label (beyond the paper)')
+    height_gate: float = setting(
+        0.5, 'Match only points whose heights over the ground differ by less; 0: off '
+        '(beyond the paper)', 'm', minimum=0.0, maximum=20.0)
+    moving_vote: bool = setting(
+        False, 'Let movable classes (people, moving cars) take part')
+
+    # grouping (Sec. III-B)
+    groups: int = setting(200, 'Key correspondences L', minimum=1, maximum=5000)
+    group_size: int = setting(400, 'Correspondences in a group k', minimum=3, maximum=20000)
+    group_keep: int = setting(20, 'Correspondences kept in a group k_1', minimum=3, maximum=1000)
+    key_spacing: float = setting(
+        1.0, 'Keys nearer to a stronger key give way to others', 'm', minimum=0.0, maximum=20.0)
+
+    # semantic-geometric consistency (Sec. III-C)
+    sigma_d: float = setting(
+        0.6, 'Two correspondences are consistent when their lengths differ by less', 'm',
+        minimum=0.005, maximum=5.0)
+    weight_cutoff: float = setting(
+        1.0, 'Multiple of sigma_d beyond which the weights W_m are zero', minimum=1.0, maximum=8.0)
+    semantics: str = setting(
+        'loose', 'Semantic consistency: tight or regional; hard: of single points (ablation 6); '
+        'none: geometry only (ablation 5)', choices=('loose', 'hard', 'none'))
+
+    # two-stage verification and refinement (Sec. III-D, III-E)
+    ground_check: bool = setting(
+        True, 'Refuse hypotheses that tilt the ground; false: ablation 8')
+    sigma_theta: float = setting(
+        math.radians(5.0), 'Largest angle between the ground normals', 'rad',
+        minimum=0.001, maximum=math.pi)
+    tau_1: float = setting(
+        0.6, 'Correspondences nearer than this under the best hypothesis refine it', 'm',
+        minimum=0.005, maximum=5.0)
+
+    refinement_rounds: int = setting(
+        3, 'Times that the refinement fits; the paper: once', minimum=1, maximum=100)
+
+    # local refinement on the clouds and acceptance (beyond the paper)
+    local_refinement: bool = setting(
+        True, 'Refine on the clouds by GICP, from which a covariance follows')
+    local_voxel_size: float = setting(
+        0.3, 'Voxel grid of the local refinement', 'm', minimum=0.01, maximum=5.0)
+    local_reach: float = setting(
+        1.0, 'Farthest pair of points that the local refinement uses', 'm',
+        minimum=0.02, maximum=10.0)
+    min_inliers: int = setting(
+        10, 'Fewer inliers are a failure', minimum=3, maximum=10000)
+    min_confidence: float = setting(
+        0.5, 'Results below this confidence are failures; 0: accept all', minimum=0.0, maximum=1.0)
+
+    threads: int = setting(2, 'Processor cores to use', minimum=1, maximum=64)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        # one neighbour search serves all three
+        for name in ('normal_radius', 'vote_radius'):
+            if getattr(self, name) > self.descriptor_radius:
+                raise InputError(f'{name} = {getattr(self, name)}: larger than '
+                                 f'descriptor_radius = {self.descriptor_radius}')
+        if self.group_keep >= self.group_size:
+            raise InputError(f'group_keep = {self.group_keep}: not below '
+                             f'group_size = {self.group_size}')
+
+    @classmethod
+    def outdoor(cls) -> Self:
+        """Return the default: a vehicle or robot with a spinning LiDAR."""
+        return cls()
+
+    @classmethod
+    def indoor(cls) -> Self:
+        """Return a preset for rooms and fragments of a few metres."""
+        return cls(min_range=0.0, max_range=20.0, voxel_size=0.05, sigma_g=0.03,
+                   normal_radius=0.10, descriptor_radius=0.25, vote_radius=0.10,
+                   height_gate=0.0, key_spacing=0.1, sigma_d=0.10, tau_1=0.10,
+                   ground_check=False, local_voxel_size=0.03, local_reach=0.10)
+
+    @classmethod
+    def paper(cls) -> Self:
+        """Return the paper's steps and nothing besides."""
+        return cls(robust_ground=False, match_within_labels=False, height_gate=0.0,
+                   moving_vote=True, weight_cutoff=6.0, refinement_rounds=1, drop_ground_labels=False,
+                   local_refinement=False,
+                   min_confidence=0.0)

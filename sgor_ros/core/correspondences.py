@@ -1,0 +1,158 @@
+"""Semantic overlap region and feature matching (Sec. III-B, Eq. 4)."""
+from dataclasses import dataclass
+from dataclasses import replace
+
+import numba
+import numpy as np
+from numpy.typing import ArrayLike
+from numpy.typing import NDArray
+
+from .checks import as_labels
+from .checks import finite_points
+from .config import SgorConfig
+from .features import regional_labels
+from .labels import label_convention
+from .labels import LabelConvention
+from .labels import UNLABELLED
+from .neighbours import radius_neighbours
+from .settings import InputError
+from .voxels import one_point_voxels
+
+
+@dataclass(frozen=True, eq=False)
+class Correspondences:
+    """G: row i of `source` is held to be the same place as row i of `target`.
+
+    Attributes
+    ----------
+    source, target : (N, 3) float64
+        Metres, each in its own scan's frame.
+    source_labels, target_labels : (N,) uint8
+        Single-point labels s^p and s^q.
+    source_regional, target_regional : (N,) uint8
+        Regional votes S(p) and S(q).
+    """
+
+    source: NDArray[np.float64]
+    target: NDArray[np.float64]
+    source_labels: NDArray[np.uint8]
+    target_labels: NDArray[np.uint8]
+    source_regional: NDArray[np.uint8]
+    target_regional: NDArray[np.uint8]
+
+    def __len__(self) -> int:
+        return len(self.source)
+
+
+@dataclass(frozen=True, eq=False)
+class Features:
+    """The keypoints of one scan that may be matched: columns of a `PreparedScan`."""
+
+    points: NDArray[np.float64]
+    labels: NDArray[np.uint8]
+    regional: NDArray[np.uint8]
+    descriptors: NDArray[np.float32]
+    heights: NDArray[np.float64]
+
+    def __getitem__(self, rows: NDArray[np.intp] | NDArray[np.bool_]) -> 'Features':
+        return Features(self.points[rows], self.labels[rows], self.regional[rows],
+                        self.descriptors[rows], self.heights[rows])
+
+    def with_heights(self, heights: NDArray[np.float64]) -> 'Features':
+        """Return a copy with (V,) heights over the ground, metres."""
+        return replace(self, heights=heights)
+
+
+def given_correspondences(source_points: ArrayLike, target_points: ArrayLike,
+                          source_labels: ArrayLike | None, target_labels: ArrayLike | None,
+                          config: SgorConfig) -> Correspondences:
+    """Check matches from elsewhere and vote their regional labels among their own points.
+
+    Raises
+    ------
+    InputError
+        Shapes that do not fit, values that are not finite, labels of one side only.
+    """
+    p = finite_points(source_points, 'source_points')
+    q = finite_points(target_points, 'target_points')
+    if len(p) != len(q):
+        raise InputError(f'target_points: expected one a source point, {len(p)}, got {len(q)}')
+    if (source_labels is None) != (target_labels is None):
+        raise InputError('source_labels and target_labels: give both or none')
+    if source_labels is None or target_labels is None:
+        none = np.full(len(p), UNLABELLED, np.uint8)
+        return Correspondences(p, q, none, none, none, none)
+    convention = label_convention(config.label_convention)
+    s, s_regional = _voted(p, as_labels(source_labels, len(p), 'source_labels'), convention, config)
+    t, t_regional = _voted(q, as_labels(target_labels, len(p), 'target_labels'), convention, config)
+    return Correspondences(p, q, s, t, s_regional, t_regional)
+
+
+def overlap_region(source: Features, target: Features) -> tuple[Features, Features]:
+    """Keep the classes that both scans have (Eq. 4); unlabelled points stay."""
+    shared = np.intersect1d(source.labels, target.labels)
+    shared = np.append(shared, UNLABELLED)
+    return source[np.isin(source.labels, shared)], target[np.isin(target.labels, shared)]
+
+
+def match(source: Features, target: Features, config: SgorConfig, *,
+          by_height: bool) -> Correspondences:
+    """Find for each source keypoint the target keypoint with the nearest descriptor.
+
+    One way, several to one allowed. `match_within_labels` and, where `by_height` says that both
+    scans have heights over the ground, `height_gate` narrow the search.
+    """
+    gate = config.height_gate if by_height and config.height_gate > 0 else np.inf
+    block = target.regional if config.match_within_labels else np.zeros_like(target.regional)
+    wanted = source.regional if config.match_within_labels else np.zeros_like(source.regional)
+    # sorted by label, then height, the candidates of a point stand in one run
+    order = np.lexsort((target.heights, block))
+    sorted_block, sorted_heights = block[order], target.heights[order]
+    descriptors = target.descriptors[order]
+    first, last = np.zeros(len(source.points), np.int64), np.zeros(len(source.points), np.int64)
+    for label in np.unique(wanted):
+        low, high = np.searchsorted(sorted_block, [label, int(label) + 1])
+        rows = wanted == label
+        run = sorted_heights[low:high]
+        first[rows] = low + np.searchsorted(run, source.heights[rows] - gate)
+        last[rows] = low + np.searchsorted(run, source.heights[rows] + gate, side='right')
+    nearest = _nearest_in_runs(source.descriptors, descriptors, first, last)
+    found = np.flatnonzero(nearest >= 0)
+    found = found[thin(found.size, config.max_correspondences)]
+    s, t = source[found], target[order[nearest[found]]]
+    return Correspondences(s.points, t.points, s.labels, t.labels, s.regional, t.regional)
+
+
+def thin(count: int, most: int) -> NDArray[np.intp]:
+    """Return at most `most` of the indices 0 to count - 1, evenly spread."""
+    if count <= most:
+        return np.arange(count)
+    return np.linspace(0, count - 1, most).astype(np.intp)
+
+
+def _voted(points: NDArray[np.float64], ids: NDArray[np.int64], convention: LabelConvention,
+           config: SgorConfig) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+    """Return point labels and regional labels of matches, (N,) each."""
+    labels, _, _ = convention.decode(ids)
+    cloud = one_point_voxels(points, labels)
+    neighbours = radius_neighbours(points, config.vote_radius)
+    return labels, regional_labels(cloud, neighbours, config.vote_radius)
+
+
+@numba.njit(cache=True, nogil=True, parallel=True, fastmath=True)
+def _nearest_in_runs(source, target, first, last):  # type: ignore[no-untyped-def]
+    """Return for each source row the nearest target row of its run, -1 for an empty run."""
+    nearest = np.empty(len(source), np.int64)
+    for i in numba.prange(len(source)):
+        best = np.float32(np.inf)
+        at = -1
+        for j in range(first[i], last[i]):
+            distance = np.float32(0.0)
+            for d in range(source.shape[1]):
+                gap = source[i, d] - target[j, d]
+                distance += gap * gap
+            if distance < best:
+                best = distance
+                at = j
+        nearest[i] = at
+    return nearest

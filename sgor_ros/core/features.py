@@ -1,0 +1,214 @@
+"""Normals, regional labels and FPFH descriptors of the non-ground points (Sec. III-B, III-C).
+
+The descriptor is that of Open3D's ``compute_fpfh_feature`` with a radius search, computed here
+because this is where the time of a scan goes.
+"""
+import math
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from .neighbours import Neighbours
+from .voxels import winning_labels
+from .voxels import VoxelCloud
+
+BINS = 11
+DESCRIPTOR_SIZE = 3 * BINS
+
+
+def regional_labels(cloud: VoxelCloud, neighbours: Neighbours, radius: float) -> NDArray[np.uint8]:
+    """Vote over the raw points within `radius` metres: S(p) of Sec. III-C, (V,)."""
+    votes = np.zeros_like(cloud.votes)
+    _sum_votes(cloud.votes, neighbours.start, neighbours.index, neighbours.squared,
+               radius * radius, votes)
+    return winning_labels(votes, cloud.classes)
+
+
+def normals(points: NDArray[np.float64], neighbours: Neighbours,
+            radius: float) -> NDArray[np.float64]:
+    """Estimate unit normals from the neighbours within `radius` metres, towards the sensor.
+
+    Returns
+    -------
+    (V, 3) float64
+        ``(0, 0, 1)`` turned to the sensor where fewer than three points lie within the radius.
+    """
+    scatter = np.empty((len(points), 3, 3))
+    _scatter(points, neighbours.start, neighbours.index, neighbours.squared, radius * radius,
+             scatter)
+    found = np.linalg.eigh(scatter)[1][:, :, 0]
+    away = np.einsum('ij,ij->i', found, points) > 0
+    found[away] *= -1.0
+    return np.ascontiguousarray(found)
+
+
+def fpfh(points: NDArray[np.float64], point_normals: NDArray[np.float64],
+         neighbours: Neighbours) -> NDArray[np.float32]:
+    """Fast point feature histograms over all of `neighbours`, rows L2-normalised.
+
+    Parameters
+    ----------
+    points, point_normals : (V, 3) float64
+    neighbours : Neighbours
+        Of `points`, as far as the radius of the descriptor.
+
+    Returns
+    -------
+    (V, 33) float32
+        Unit rows; a row of zeros where a point has no neighbour.
+    """
+    simple = np.zeros((len(points), DESCRIPTOR_SIZE), np.float32)
+    _simple_histograms(points.astype(np.float32), point_normals.astype(np.float32),
+                       neighbours.start, neighbours.index, simple)
+    full = np.zeros_like(simple)
+    _weighted_histograms(simple, neighbours.start, neighbours.index, neighbours.squared, full)
+    return unit_rows(full)
+
+
+def unit_rows(descriptors: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Scale each row to length one; rows of zeros stay."""
+    length = np.linalg.norm(descriptors, axis=1, keepdims=True)
+    return (descriptors / np.maximum(length, 1e-12)).astype(np.float32)
+
+
+@numba.njit(cache=True, nogil=True, parallel=True)
+def _sum_votes(own, start, index, squared, limit, votes):  # type: ignore[no-untyped-def]
+    for i in numba.prange(len(own)):
+        for k in range(start[i], start[i + 1]):
+            if squared[k] <= limit:
+                for c in range(own.shape[1]):
+                    votes[i, c] += own[index[k], c]
+
+
+@numba.njit(cache=True, nogil=True, parallel=True)
+def _scatter(points, start, index, squared, limit, scatter):  # type: ignore[no-untyped-def]
+    for i in numba.prange(len(points)):
+        n = 0
+        # sums of differences to the point itself: no cancellation far from the origin
+        sx = sy = sz = sxx = sxy = sxz = syy = syz = szz = 0.0
+        for k in range(start[i], start[i + 1]):
+            if squared[k] <= limit:
+                j = index[k]
+                x = points[j, 0] - points[i, 0]
+                y = points[j, 1] - points[i, 1]
+                z = points[j, 2] - points[i, 2]
+                n += 1
+                sx += x
+                sy += y
+                sz += z
+                sxx += x * x
+                sxy += x * y
+                sxz += x * z
+                syy += y * y
+                syz += y * z
+                szz += z * z
+        if n < 3:
+            scatter[i] = np.diag(np.array([1.0, 1.0, 0.0]))
+            continue
+        scatter[i, 0, 0] = sxx / n - sx * sx / (n * n)
+        scatter[i, 1, 1] = syy / n - sy * sy / (n * n)
+        scatter[i, 2, 2] = szz / n - sz * sz / (n * n)
+        scatter[i, 0, 1] = scatter[i, 1, 0] = sxy / n - sx * sy / (n * n)
+        scatter[i, 0, 2] = scatter[i, 2, 0] = sxz / n - sx * sz / (n * n)
+        scatter[i, 1, 2] = scatter[i, 2, 1] = syz / n - sy * sz / (n * n)
+
+
+@numba.njit(cache=True, nogil=True, inline='always')
+def _angle_bin(y, x):  # type: ignore[no-untyped-def]
+    """Return floor(11 (atan2(y, x) + pi) / 2 pi) by a polynomial good to 1e-6 rad."""
+    ax = abs(x)
+    ay = abs(y)
+    small = min(ax, ay)
+    large = max(max(ax, ay), np.float32(1e-30))
+    t = small / large
+    s = t * t
+    a = np.float32(-0.0117212)
+    a = a * s + np.float32(0.05265332)
+    a = a * s + np.float32(-0.11643287)
+    a = a * s + np.float32(0.19354346)
+    a = a * s + np.float32(-0.33262347)
+    a = a * s + np.float32(0.99997726)
+    a = a * t
+    a = np.float32(math.pi / 2) - a if ay > ax else a
+    a = np.float32(math.pi) - a if x < 0 else a
+    a = -a if y < 0 else a
+    return np.int32((a + np.float32(math.pi)) * np.float32(BINS / (2 * math.pi)))
+
+
+@numba.njit(cache=True, nogil=True, parallel=True, error_model='numpy',
+            fastmath={'nsz', 'arcp', 'contract', 'afn', 'reassoc'})
+def _simple_histograms(points, normals, start, index, simple):  # type: ignore[no-untyped-def]
+    """SPFH of each point: angles of the Darboux frame to every neighbour, 11 bins each."""
+    for i in numba.prange(len(points)):
+        count = start[i + 1] - start[i] - 1
+        if count < 1:
+            continue
+        bins = np.empty((3, count), np.int32)
+        px, py, pz = points[i, 0], points[i, 1], points[i, 2]
+        nx, ny, nz = normals[i, 0], normals[i, 1], normals[i, 2]
+        first = start[i] + 1
+        for k in range(count):
+            j = index[first + k]
+            dx = points[j, 0] - px
+            dy = points[j, 1] - py
+            dz = points[j, 2] - pz
+            mx, my, mz = normals[j, 0], normals[j, 1], normals[j, 2]
+            inverse = np.float32(1.0) / math.sqrt(dx * dx + dy * dy + dz * dz)
+            here = (nx * dx + ny * dy + nz * dz) * inverse
+            there = (mx * dx + my * dy + mz * dz) * inverse
+            # the end whose normal is nearer to the line is the source of the frame
+            swap = abs(here) < abs(there)
+            sign = np.float32(-1.0) if swap else np.float32(1.0)
+            ux = mx if swap else nx
+            uy = my if swap else ny
+            uz = mz if swap else nz
+            tx = nx if swap else mx
+            ty = ny if swap else my
+            tz = nz if swap else mz
+            phi = -there if swap else here
+            vx = (dy * uz - dz * uy) * sign
+            vy = (dz * ux - dx * uz) * sign
+            vz = (dx * uy - dy * ux) * sign
+            length = math.sqrt(vx * vx + vy * vy + vz * vz)
+            scale = np.float32(1.0) / length if length > 0 else np.float32(0.0)
+            vx *= scale
+            vy *= scale
+            vz *= scale
+            wx = uy * vz - uz * vy
+            wy = uz * vx - ux * vz
+            wz = ux * vy - uy * vx
+            alpha = vx * tx + vy * ty + vz * tz
+            flat = length == 0
+            theta_y = np.float32(0.0) if flat else wx * tx + wy * ty + wz * tz
+            theta_x = np.float32(1.0) if flat else ux * tx + uy * ty + uz * tz
+            phi = np.float32(0.0) if flat else phi
+            bins[0, k] = min(max(_angle_bin(theta_y, theta_x), 0), BINS - 1)
+            bins[1, k] = BINS + min(max(np.int32((alpha + 1) * np.float32(BINS / 2)), 0), BINS - 1)
+            bins[2, k] = 2 * BINS + min(max(np.int32((phi + 1) * np.float32(BINS / 2)), 0),
+                                        BINS - 1)
+        step = np.float32(100.0 / count)
+        for k in range(count):
+            simple[i, bins[0, k]] += step
+            simple[i, bins[1, k]] += step
+            simple[i, bins[2, k]] += step
+
+
+@numba.njit(cache=True, nogil=True, parallel=True, error_model='numpy', fastmath=True)
+def _weighted_histograms(simple, start, index, squared, full):  # type: ignore[no-untyped-def]
+    """FPFH: own SPFH plus those of the neighbours by inverse squared distance."""
+    for i in numba.prange(len(simple)):
+        total = np.zeros(simple.shape[1], np.float32)
+        for k in range(start[i] + 1, start[i + 1]):
+            if squared[k] > 0:
+                weight = np.float32(1.0) / squared[k]
+                j = index[k]
+                for b in range(total.size):
+                    total[b] += weight * simple[j, b]
+        for part in range(3):
+            mass = np.float32(0.0)
+            for b in range(part * BINS, (part + 1) * BINS):
+                mass += total[b]
+            scale = np.float32(100.0) / mass if mass > 0 else np.float32(0.0)
+            for b in range(part * BINS, (part + 1) * BINS):
+                full[i, b] = simple[i, b] + scale * total[b]

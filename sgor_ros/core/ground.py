@@ -1,0 +1,121 @@
+"""Secondary ground segmentation (Sec. III-B, Eq. 2 and 3; normal by Eq. 16)."""
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .config import SgorConfig
+from .voxels import VoxelCloud
+
+
+GEOMETRY_TRIALS = 300
+GEOMETRY_SEED = 0
+
+
+@dataclass(frozen=True)
+class Ground:
+    """The ground plane of one scan: points x on it have ``normal @ x + offset = 0``.
+
+    Attributes
+    ----------
+    normal : (3,) float64
+        Unit normal n, towards the sensor.
+    offset : float
+        Height of the sensor over the plane, metres.
+    mask : (V,) bool
+        Which voxels are ground.
+    source : {'labels', 'geometry'}
+        Where the first guess of the ground came from.
+    """
+
+    normal: NDArray[np.float64]
+    offset: float
+    mask: NDArray[np.bool_]
+    source: Literal['labels', 'geometry']
+
+    def heights(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the signed distance of each point over the plane, (N,) metres."""
+        return points @ self.normal + self.offset
+
+
+def segment_ground(cloud: VoxelCloud, ground_classes: frozenset[int],
+                   config: SgorConfig) -> Ground | None:
+    """Find the ground by labels, plane, distance to the plane, and plane again.
+
+    Returns
+    -------
+    Ground or None
+        None where neither labels nor geometry show a ground plane.
+    """
+    by_label = np.isin(cloud.labels, list(ground_classes))
+    if by_label.sum() >= config.min_ground_points:
+        return _by_labels(cloud.points, by_label, config)
+    return _by_geometry(cloud.points, config)
+
+
+def fit_plane(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
+    """Fit a plane by SVD of the scatter (Eq. 16); normal towards the origin.
+
+    Returns
+    -------
+    normal : (3,) float64
+    offset : float
+        Distance of the origin from the plane, metres, not negative.
+    """
+    mean = points.mean(axis=0)
+    centred = points - mean
+    normal = np.linalg.svd(centred.T @ centred)[2][-1]
+    offset = -float(normal @ mean)
+    return (normal, offset) if offset >= 0 else (-normal, -offset)
+
+
+def _by_labels(points: NDArray[np.float64], by_label: NDArray[np.bool_],
+               config: SgorConfig) -> Ground | None:
+    normal, offset = fit_plane(points[by_label])
+    if not config.secondary_ground:
+        return Ground(normal, offset, by_label, 'labels')
+    near = np.abs(points @ normal + offset) < config.sigma_g
+    if config.robust_ground:
+        # wrong labels lift the first plane: let the points near it, then nearer, decide
+        seed = by_label & (np.linalg.norm(points[:, :2], axis=1) < config.ground_radius)
+        if seed.sum() >= config.min_ground_points:
+            by_label = seed
+        for band in (4.0, 2.0, 1.0):
+            near = by_label & (np.abs(points @ normal + offset) < band * config.sigma_g)
+            if near.sum() < config.min_ground_points:
+                break
+            normal, offset = fit_plane(points[near])
+        near = np.abs(points @ normal + offset) < config.sigma_g
+    if near.sum() < config.min_ground_points:
+        return None
+    if not config.robust_ground:
+        normal, offset = fit_plane(points[near])
+    return Ground(normal, offset, near, 'labels')
+
+
+def _by_geometry(points: NDArray[np.float64], config: SgorConfig) -> Ground | None:
+    """Find the plane through most points that has next to nothing below it (RANSAC)."""
+    near = points[np.linalg.norm(points, axis=1) < config.ground_radius]
+    if len(near) < config.min_ground_points:
+        return None
+    rng = np.random.default_rng(GEOMETRY_SEED)
+    corners = near[rng.integers(len(near), size=(GEOMETRY_TRIALS, 3))]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    normals = np.divide(normals, length, out=np.zeros_like(normals), where=length > 0)
+    offsets = -np.einsum('ij,ij->i', normals, corners[:, 0])
+    flip = offsets < 0
+    normals[flip], offsets[flip] = -normals[flip], -offsets[flip]
+    heights = near @ normals.T + offsets
+    # what lies below a wall or a table plane tells it from the ground
+    score = ((np.abs(heights) < config.sigma_g).sum(axis=0)
+             - 3 * (heights < -2 * config.sigma_g).sum(axis=0))
+    score[length[:, 0] == 0] = 0
+    best = int(np.argmax(score))
+    if score[best] < config.min_ground_points:
+        return None
+    normal, offset = normals[best], float(offsets[best])
+    for _ in range(2):
+        normal, offset = fit_plane(near[np.abs(near @ normal + offset) < config.sigma_g])
+    return Ground(normal, offset, np.abs(points @ normal + offset) < config.sigma_g, 'geometry')

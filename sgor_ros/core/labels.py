@@ -1,0 +1,127 @@
+"""Label conventions: from the ids in a scan to the classes inside (Sec. III-B, S and S_g).
+
+The only files that the core reads are its own label tables under ``config/labels``.
+"""
+from dataclasses import dataclass
+from functools import cached_property
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+import yaml
+
+from .settings import InputError
+
+UNLABELLED = 0
+"""The class inside of everything without a label; it votes for nothing."""
+
+_HOME = Path(__file__).resolve()
+# beside a checkout's package, or under the prefix that it was installed to
+_TABLES = (_HOME.parents[2] / 'config/labels',
+           *(folder / 'share/sgor_ros/config/labels' for folder in _HOME.parents))
+
+
+@dataclass(frozen=True)
+class LabelConvention:
+    """What the ids of a labelled scan mean.
+
+    Attributes
+    ----------
+    name : str
+        Name or path it was asked for by.
+    mask : int
+        Bits of an id that hold the class (SemanticKITTI keeps the instance in the others).
+    classes : dict of int to int
+        Id in the scan to class inside, 1 to 255; ids not listed are unlabelled (0).
+    names : dict of int to str
+        Class inside to its name.
+    ground : frozenset of int
+        Classes inside that are ground or road: S_g of the paper.
+    movable : frozenset of int
+        Classes inside that can move between two scans.
+    drop : frozenset of int
+        Ids whose points are removed, such as the ego vehicle.
+    """
+
+    name: str
+    mask: int
+    classes: dict[int, int]
+    names: dict[int, str]
+    ground: frozenset[int]
+    movable: frozenset[int]
+    drop: frozenset[int]
+
+    def decode(self, labels: NDArray[np.int64]
+               ) -> tuple[NDArray[np.uint8], NDArray[np.bool_], list[int]]:
+        """Translate the ids of a scan.
+
+        Returns
+        -------
+        classes : (N,) uint8
+            Class inside of each point.
+        keep : (N,) bool
+            False where the id is one to drop.
+        unknown : list of int
+            Ids that the convention does not list, sorted.
+        """
+        ids = labels & self.mask
+        table, dropped, known = self._tables
+        rows = np.minimum(ids, table.size - 1)    # the last row stands for all larger ids
+        unknown = ids[~known[rows]]
+        return table[rows], ~dropped[rows], np.unique(unknown).tolist() if unknown.size else []
+
+    def class_name(self, class_id: int) -> str:
+        """Return the name of a class inside."""
+        return self.names.get(class_id, f'class {class_id}')
+
+    @cached_property
+    def _tables(self) -> tuple[NDArray[np.uint8], NDArray[np.bool_], NDArray[np.bool_]]:
+        size = max([*self.classes, *self.drop]) + 2
+        table = np.full(size, UNLABELLED, np.uint8)
+        table[list(self.classes)] = list(self.classes.values())
+        dropped = np.zeros(size, np.bool_)
+        dropped[list(self.drop)] = True
+        known = dropped.copy()
+        known[list(self.classes)] = True
+        return table, dropped, known
+
+
+@lru_cache(maxsize=16)
+def label_convention(name: str) -> LabelConvention:
+    """Return the convention of a name under ``config/labels``, or of a path to a YAML file.
+
+    Raises
+    ------
+    InputError
+        No such convention, or a file that is none.
+    """
+    path = Path(name)
+    if path.suffix not in ('.yaml', '.yml'):
+        found = [folder / f'{name}.yaml' for folder in _TABLES if folder.is_dir()]
+        path = next((p for p in found if p.is_file()), path)
+    if not path.is_file():
+        known = sorted(p.stem for folder in _TABLES for p in folder.glob('*.yaml'))
+        raise InputError(f'label_convention = {name!r}: neither a convention '
+                         f'({", ".join(dict.fromkeys(known))}) nor a YAML file')
+    try:
+        return _parse(name, yaml.safe_load(path.read_text()))
+    except (yaml.YAMLError, KeyError, TypeError, ValueError, AttributeError) as error:
+        raise InputError(f'label_convention = {name!r}: {path} is not a label convention: '
+                         f'{error!r}') from error
+
+
+def _parse(name: str, table: dict[str, Any]) -> LabelConvention:
+    classes = {int(k): int(v) for k, v in table['classes'].items()}
+    if not all(0 <= c <= 255 for c in classes.values()) or not all(0 <= k < 2**16 for k in classes):
+        raise ValueError('ids must be in 0 to 65535 and classes in 0 to 255')
+    mask = int(table.get('mask', 0xFFFFFFFF))
+    if mask < 0:
+        raise ValueError('mask must not be negative')    # so that a masked id never is
+    return LabelConvention(
+        name=name, mask=mask, classes=classes,
+        names={int(k): str(v) for k, v in table['names'].items()},
+        ground=frozenset(int(c) for c in table['ground']),
+        movable=frozenset(int(c) for c in table.get('movable', ())),
+        drop=frozenset(int(i) for i in table.get('drop', ())))

@@ -1,0 +1,142 @@
+"""`preprocess`: everything of one scan that does not depend on the other (Sec. III-B)."""
+import numpy as np
+from numpy.typing import ArrayLike
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from .alignment import surface
+from .checks import finite_points
+from .config import SgorConfig
+from .correspondences import Features
+from .features import fpfh
+from .features import normals
+from .features import regional_labels
+from .features import unit_rows
+from .ground import Ground
+from .ground import segment_ground
+from .labels import label_convention
+from .labels import LabelConvention
+from .labels import UNLABELLED
+from .neighbours import radius_neighbours
+from .scan import PreparedScan
+from .scan import SemanticScan
+from .settings import InputError
+from .stopwatch import Stopwatch
+from .threads import use_threads
+from .voxels import voxel_grid
+from .voxels import VoxelCloud
+
+
+def preprocess(scan: SemanticScan, config: SgorConfig | None = None, *,
+               keypoints: ArrayLike | None = None,
+               descriptors: ArrayLike | None = None) -> PreparedScan:
+    """Segment the ground and describe the rest of one scan, once for all its registrations.
+
+    Parameters
+    ----------
+    scan : SemanticScan
+    config : SgorConfig, optional
+        ``SgorConfig.outdoor()`` where none is given.
+    keypoints : (V, 3) array, optional
+        Keypoints of the caller, metres, in place of the voxels.
+    descriptors : (V, D) array, optional
+        Their learned features, such as FCGF; both scans need the same D.
+
+    Returns
+    -------
+    PreparedScan
+
+    Raises
+    ------
+    InputError
+        Only one of keypoints and descriptors is given, or their lengths differ.
+    """
+    config = config or SgorConfig()
+    convention = label_convention(config.label_convention)
+    use_threads(config.threads)
+    clock = Stopwatch()
+    with clock('voxel grid'):
+        points, labels, warnings = _usable(scan, convention, config)
+        cloud = voxel_grid(points, labels, config.voxel_size)
+    with clock('ground'):
+        ground = segment_ground(cloud, convention.ground, config)
+        keep = _matchable(cloud, ground, convention, config)
+    if keypoints is None and descriptors is None:
+        features = _describe(cloud[keep], config, clock)
+    else:
+        features = _given(keypoints, descriptors, cloud, keep, config)
+    if ground is None:
+        warnings.append('no ground plane found: no ground check')
+    else:
+        features = features.with_heights(ground.heights(features.points))
+        if ground.source == 'geometry':
+            warnings.append('no ground labels: ground plane found by geometry')
+    with clock('surface'):
+        fixed = (slice(None) if config.moving_vote
+                 else ~np.isin(labels, list(convention.movable)))
+        near_surface = (surface(points[fixed], config.local_voxel_size, config.threads)
+                        if config.local_refinement else None)
+    return PreparedScan(scan, config, features, ground, near_surface, tuple(warnings),
+                        clock.seconds)
+
+
+def _usable(scan: SemanticScan, convention: LabelConvention, config: SgorConfig
+            ) -> tuple[NDArray[np.float32], NDArray[np.uint8], list[str]]:
+    """Return points within range, their classes inside, and what was odd."""
+    squared = np.einsum('ij,ij->i', scan.points, scan.points)
+    keep = (squared >= config.min_range**2) & (squared <= config.max_range**2)
+    if scan.labels is None:
+        points = scan.points[keep]
+        return points, np.full(len(points), UNLABELLED, np.uint8), []
+    labels, fixed, unknown = convention.decode(scan.labels)
+    keep &= fixed
+    warnings = []
+    if unknown:
+        warnings.append(f'label ids {unknown} are not in convention {convention.name}: '
+                        'treated as unlabelled')
+    return scan.points[keep], labels[keep], warnings
+
+
+def _matchable(cloud: VoxelCloud, ground: Ground | None, convention: LabelConvention,
+               config: SgorConfig) -> NDArray[np.bool_]:
+    """Return which voxels take part in matching."""
+    keep = np.ones(len(cloud.points), np.bool_)
+    if config.correspondence_preprocessing:
+        if ground is not None:
+            keep &= ~ground.mask
+        if config.drop_ground_labels:
+            keep &= ~np.isin(cloud.labels, list(convention.ground))
+    if not config.moving_vote:
+        keep &= ~np.isin(cloud.labels, list(convention.movable))
+    return keep
+
+
+def _describe(cloud: VoxelCloud, config: SgorConfig, clock: Stopwatch) -> Features:
+    with clock('neighbours'):
+        neighbours = radius_neighbours(cloud.points, config.descriptor_radius)
+    with clock('votes'):
+        regional = regional_labels(cloud, neighbours, config.vote_radius)
+    with clock('normals'):
+        directions = normals(cloud.points, neighbours, config.normal_radius)
+    with clock('descriptors'):
+        described = fpfh(cloud.points, directions, neighbours)
+    return Features(cloud.points, cloud.labels, regional, described, np.zeros(len(cloud.points)))
+
+
+def _given(keypoints: ArrayLike | None, descriptors: ArrayLike | None, cloud: VoxelCloud,
+           keep: NDArray[np.bool_], config: SgorConfig) -> Features:
+    """Give the caller's keypoints the labels of the nearest voxel; drop those on the ground."""
+    if keypoints is None or descriptors is None:
+        raise InputError('keypoints and descriptors: give both or none')
+    points = finite_points(keypoints, 'keypoints')
+    described = np.asarray(descriptors, np.float32)
+    if described.ndim != 2 or len(described) != len(points):
+        raise InputError(f'descriptors: expected one row a keypoint, ({len(points)}, D), '
+                         f'got shape {described.shape}')
+    neighbours = radius_neighbours(cloud.points, config.vote_radius)
+    regional = regional_labels(cloud, neighbours, config.vote_radius)
+    nearest = cKDTree(cloud.points).query(points, workers=config.threads)[1]
+    rows = np.flatnonzero(keep[nearest])
+    nearest = nearest[rows]
+    return Features(points[rows], cloud.labels[nearest], regional[nearest],
+                    unit_rows(described[rows]), np.zeros(len(rows)))

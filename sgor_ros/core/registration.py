@@ -1,0 +1,132 @@
+"""SGOR on one screen: `register` two scans, `solve` for the transformation of matches."""
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .acceptance import judge
+from .alignment import align
+from .config import SgorConfig
+from .consistency import consistency_graph
+from .consistency import label_agreement
+from .consistency import seed_rows
+from .correspondences import Correspondences
+from .correspondences import given_correspondences
+from .correspondences import match
+from .correspondences import overlap_region
+from .grouping import group
+from .hypotheses import hypothesise
+from .hypotheses import MIN_POINTS
+from .preprocessing import preprocess
+from .refinement import inliers
+from .refinement import refine
+from .scan import PreparedScan
+from .scan import Registration
+from .scan import SemanticScan
+from .stopwatch import Stopwatch
+from .threads import use_threads
+from .verification import Normals
+from .verification import verify
+
+
+def register(source: SemanticScan | PreparedScan, target: SemanticScan | PreparedScan,
+             config: SgorConfig | None = None) -> Registration:
+    """Find the transformation between two overlapping scans, without an initial guess.
+
+    Parameters
+    ----------
+    source, target : SemanticScan or PreparedScan
+        Prepared scans are used as they are: prepare once, register often.
+    config : SgorConfig, optional
+        ``SgorConfig.outdoor()`` where none is given.
+
+    Returns
+    -------
+    Registration
+        With ``success=False`` and a reason where the scans cannot be registered.
+    """
+    config = config or SgorConfig()
+    use_threads(config.threads)
+    clock = Stopwatch()
+    with clock('preprocessing'):
+        source = source if isinstance(source, PreparedScan) else preprocess(source, config)
+        target = target if isinstance(target, PreparedScan) else preprocess(target, config)
+    with clock('matching'):
+        p, q = source.features, target.features
+        if config.correspondence_preprocessing:
+            p, q = overlap_region(p, q)
+        grounds = (source.ground and target.ground) and (source.ground, target.ground)
+        correspondences = match(p, q, config, by_height=grounds is not None)
+    normals = grounds and (grounds[0].normal, grounds[1].normal)
+    result = solve(correspondences, normals, config, clock)
+    with clock('alignment'):
+        if result.success and source.surface and target.surface:
+            local = align(source.surface, target.surface, result.T_target_source, config)
+            result = replace(result, T_target_source=local.T_target_source,
+                             covariance=local.covariance,
+                             inliers=inliers(local.T_target_source, correspondences, config.tau_1))
+    with clock('acceptance'):
+        result = judge(result, source, target, config)
+    return replace(result, source_ground=source.ground, target_ground=target.ground,
+                   warnings=(*(f'source: {w}' for w in source.warnings),
+                             *(f'target: {w}' for w in target.warnings)))
+
+
+def register_correspondences(source_points: ArrayLike, target_points: ArrayLike,
+                             source_labels: ArrayLike | None = None,
+                             target_labels: ArrayLike | None = None, *,
+                             ground_normals: Normals | None = None,
+                             config: SgorConfig | None = None) -> Registration:
+    """Find the transformation behind matches from elsewhere.
+
+    Parameters
+    ----------
+    source_points, target_points : (N, 3) array
+        Row i of one is held to be the same place as row i of the other, metres.
+    source_labels, target_labels : (N,) array of integers, optional
+        Ids of the configured label convention; regional labels are voted among the matches.
+    ground_normals : pair of (3,) arrays, optional
+        Ground normals of source and target, towards the sensor; without, no ground check.
+    config : SgorConfig, optional
+
+    Raises
+    ------
+    InputError
+        Shapes that do not fit, or values that are not finite.
+    """
+    config = config or SgorConfig()
+    use_threads(config.threads)
+    clock = Stopwatch()
+    correspondences = given_correspondences(source_points, target_points, source_labels,
+                                            target_labels, config)
+    return solve(correspondences, ground_normals, config, clock)
+
+
+def solve(correspondences: Correspondences, ground_normals: Normals | None, config: SgorConfig,
+          clock: Stopwatch) -> Registration:
+    """Remove outliers by semantic-geometric consistency and fit (Sec. III-B to III-E)."""
+    found = Registration(False, '', None, correspondences.source, correspondences.target,
+                         np.zeros(len(correspondences), np.bool_), timings=clock.seconds)
+    if len(correspondences) < MIN_POINTS:
+        return replace(found, reason=f'only {len(correspondences)} correspondences')
+    with clock('consistency graph'):
+        graph = consistency_graph(correspondences, config)
+    with clock('grouping'):
+        groups = group(correspondences, graph, config)
+    with clock('consistency'):
+        rows = seed_rows(graph, groups, *label_agreement(correspondences, config.semantics))
+    with clock('hypotheses'):
+        hypotheses = hypothesise(correspondences, groups, rows, config.group_keep)
+    with clock('verification'):
+        verdict = verify(hypotheses, correspondences, ground_normals, config)
+    found = replace(found, hypotheses=hypotheses.T_target_source,
+                    passed_ground_check=verdict.passed_ground_check, best_hypothesis=verdict.best)
+    if verdict.best < 0:
+        return replace(found, reason=verdict.reason)
+    with clock('refinement'):
+        T = refine(hypotheses.T_target_source[verdict.best], correspondences, config)
+        agree = inliers(T, correspondences, config.tau_1)
+    if agree.sum() < config.min_inliers:
+        return replace(found, T_target_source=T, inliers=agree,
+                       reason=f'only {agree.sum()} inliers, min_inliers is {config.min_inliers}')
+    return replace(found, success=True, T_target_source=T, inliers=agree)

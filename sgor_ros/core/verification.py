@@ -1,0 +1,83 @@
+"""Two-stage hypothesis verification (Sec. III-D): ground normals, then truncated distance."""
+from dataclasses import dataclass
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from .config import SgorConfig
+from .correspondences import Correspondences
+from .hypotheses import Hypotheses
+
+
+Normals = tuple[NDArray[np.float64], NDArray[np.float64]]
+"""Ground normals of source and target, unit (3,) vectors towards their sensors."""
+
+
+@dataclass(frozen=True, eq=False)
+class Verdict:
+    """Which hypotheses passed.
+
+    Attributes
+    ----------
+    passed_ground_check : (H,) bool
+    cost : (H,) float64
+        Mean truncated distance over G', metres; infinite where the ground check failed.
+    best : int
+        Index of the winner, -1 if none passed.
+    """
+
+    passed_ground_check: NDArray[np.bool_]
+    cost: NDArray[np.float64]
+    best: int
+
+    @property
+    def reason(self) -> str:
+        """Why there is no winner, in words."""
+        if not len(self.cost):
+            return 'no group of correspondences is consistent'
+        return f'none of {len(self.cost)} hypotheses keeps the ground level'
+
+
+def verify(hypotheses: Hypotheses, correspondences: Correspondences, ground_normals: Normals | None,
+           config: SgorConfig) -> Verdict:
+    """Drop hypotheses that tilt the ground, then take the nearest fit of the filtered matches."""
+    T = hypotheses.T_target_source
+    passed = np.ones(len(T), np.bool_)
+    if config.ground_check and ground_normals is not None:
+        passed = ground_angles(T, *ground_normals) < config.sigma_theta
+    cost = np.full(len(T), np.inf)
+    if not passed.any():
+        return Verdict(passed, cost, -1)
+    union = np.unique(hypotheses.kept[hypotheses.kept >= 0])
+    cost[passed] = truncated_distance(
+        T[passed], correspondences.source[union], correspondences.target[union], config.sigma_d)
+    return Verdict(passed, cost, int(np.argmin(cost)))
+
+
+def ground_angles(T: NDArray[np.float64], source_normal: NDArray[np.float64],
+                  target_normal: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the angle between R n_p and n_q for each of (H, 4, 4), radians (Eq. 17).
+
+    Both normals point to their sensor, so the sign counts: an upside-down ground is refused.
+    """
+    moved = T[:, :3, :3] @ source_normal
+    return np.arctan2(np.linalg.norm(np.cross(moved, target_normal), axis=1),
+                      moved @ target_normal)
+
+
+@numba.njit(cache=True, nogil=True, parallel=True, fastmath=True)
+def truncated_distance(T, source, target, sigma_d):  # type: ignore[no-untyped-def]
+    """Return the mean of TD over (N, 3) matches for each of (H, 4, 4) (Eq. 18 and 19), metres."""
+    cost = np.empty(len(T))
+    for h in numba.prange(len(T)):
+        total = 0.0
+        for i in range(len(source)):
+            squared = 0.0
+            for a in range(3):
+                gap = (T[h, a, 0] * source[i, 0] + T[h, a, 1] * source[i, 1]
+                       + T[h, a, 2] * source[i, 2] + T[h, a, 3] - target[i, a])
+                squared += gap * gap
+            total += min(max(np.sqrt(squared), 0.5 * sigma_d), 2.5 * sigma_d)
+        cost[h] = total / len(source)
+    return cost
