@@ -1,0 +1,13 @@
+"""Raw SemanticKITTI label ids of the classes in the world."""
+
+CAR = 10
+ROAD = 40
+SIDEWALK = 48
+BUILDING = 50
+FENCE = 51
+VEGETATION = 70
+TRUNK = 71
+TERRAIN = 72
+POLE = 80
+TRAFFIC_SIGN = 81
+OTHER_OBJECT = 99
