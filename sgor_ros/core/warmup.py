@@ -1,0 +1,18 @@
+"""Compile, or load from the cache, everything that a registration runs."""
+import numpy as np
+
+from .config import SgorConfig
+from .preprocessing import preprocess
+from .registration import register
+from .scan import SemanticScan
+
+
+def warm_up(config: SgorConfig) -> None:
+    """Register a small made-up scene to itself, so that the first real scan does not wait."""
+    rng = np.random.default_rng(0)
+    size = 40 * config.voxel_size
+    walls = rng.uniform(-size, size, (3000, 3))
+    walls[:1000, 2], walls[1000:2000, 0], walls[2000:, 1] = -size / 4, size, size
+    prepared = preprocess(SemanticScan(walls, np.zeros(len(walls), np.int64)),
+                          config.replace(min_range=0.0, max_range=4 * size))
+    register(prepared, prepared, config)
