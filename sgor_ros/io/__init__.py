@@ -1,0 +1,1 @@
+"""Files, bags and messages: everything that brings scans in and results out, without ROS."""
