@@ -1,0 +1,1 @@
+"""How good a registration or a trajectory is, against ground truth."""

@@ -1,0 +1,83 @@
+"""Layers point one way: core <- tracker <- shells; the world stands alone."""
+import ast
+from pathlib import Path
+import subprocess
+import sys
+
+import pytest
+
+import sgor_ros
+
+PACKAGE = Path(sgor_ros.__file__).parent
+SHELLS = {'io', 'ros', 'commands', 'evaluation'}
+ROS = {'rclpy', 'ament_index_python', 'launch', 'launch_ros', 'sensor_msgs', 'nav_msgs',
+       'geometry_msgs', 'visualization_msgs', 'diagnostic_msgs', 'std_msgs', 'std_srvs',
+       'builtin_interfaces', 'rcl_interfaces', 'tf2_msgs'}
+FILES = {'rosbags', 'matplotlib', 'tqdm', 'argparse'}
+
+# module or folder -> what it may import of the package besides itself
+MAY_IMPORT = {
+    'core': set(),
+    'tracker': {'core'},
+    'io': {'core', 'tracker'},
+    'evaluation': {'core', 'tracker', 'io'},
+    'ros': {'core', 'tracker', 'io'},
+    'commands': {'core', 'tracker', 'io', 'evaluation', 'ros', 'world'},
+    'world': set(),
+}
+
+
+def imports_of(path):
+    """Return the dotted names that a file imports, anywhere in it, relative ones resolved."""
+    package = ('sgor_ros', *path.relative_to(PACKAGE).parent.parts)
+    names = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            base = '.'.join(package[:len(package) - node.level + 1]) if node.level else ''
+            module = '.'.join(part for part in (base, node.module) if part)
+            names |= {f'{module}.{alias.name}' for alias in node.names}
+    return names
+
+
+def layer_of(path):
+    return path.relative_to(PACKAGE).parts[0].removesuffix('.py')
+
+
+SOURCES = sorted(path for path in PACKAGE.rglob('*.py') if path != PACKAGE / '__init__.py')
+
+
+@pytest.mark.parametrize('path', SOURCES, ids=lambda path: str(path.relative_to(PACKAGE)))
+def test_a_file_imports_only_what_is_below_it(path):
+    layer = layer_of(path)
+    allowed = MAY_IMPORT[layer] | {layer}
+    for name in imports_of(path):
+        top, *rest = name.split('.')
+        if top == 'sgor_ros':
+            # `from sgor_ros import register` is the core and the tracker
+            below = rest[0] if rest[0] in MAY_IMPORT else 'core'
+            assert below in allowed, f'{layer} imports {name}'
+        if layer in {'core', 'tracker', 'world', 'io', 'evaluation'}:
+            assert top not in ROS, f'{layer} imports {name}'
+        if layer in {'core', 'tracker', 'world'}:
+            assert top not in FILES, f'{layer} imports {name}'
+        if layer in {'core', 'tracker'}:
+            assert top != 'open3d', f'{layer} imports {name}'
+
+
+def test_the_public_interface_is_core_and_tracker():
+    layers = {name.split('.')[1] for name in imports_of(PACKAGE / '__init__.py')}
+    assert layers == {'core', 'tracker'}
+
+
+def test_core_and_tracker_load_neither_ros_nor_files():
+    shells = [f'sgor_ros.{name}' for name in (*SHELLS, 'world')]
+    unwanted = [*ROS, *FILES - {'argparse'}, 'open3d', *shells]
+    code = ('import importlib, pkgutil, sys, sgor_ros, sgor_ros.core\n'
+            'for module in pkgutil.iter_modules(sgor_ros.core.__path__):\n'
+            '    importlib.import_module(f"sgor_ros.core.{module.name}")\n'
+            f'print(*(name for name in {unwanted} if name in sys.modules))')
+    done = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True,
+                          cwd=PACKAGE.parent, check=True)
+    assert done.stdout.split() == []

@@ -1,0 +1,88 @@
+"""Metrics against values computed by hand."""
+import math
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from sgor_ros import InputError
+from sgor_ros.evaluation import metrics
+
+
+def pose(x=0.0, y=0.0, z=0.0, yaw_deg=0.0):
+    T = np.eye(4)
+    T[:3, :3] = Rotation.from_euler('z', yaw_deg, degrees=True).as_matrix()
+    T[:3, 3] = x, y, z
+    return T
+
+
+def test_rotation_error_is_the_angle_between_and_resolves_small_ones():
+    assert metrics.rotation_error_deg(pose(yaw_deg=30), pose(yaw_deg=-60)) == pytest.approx(90)
+    assert metrics.rotation_error_deg(pose(yaw_deg=1), pose(x=9, yaw_deg=1.0001)) == (
+        pytest.approx(1e-4, rel=1e-6))
+    assert metrics.rotation_error_deg(pose(yaw_deg=180), pose()) == pytest.approx(180)
+
+
+def test_translation_error_is_a_distance_whatever_the_rotation():
+    assert metrics.translation_error_m(pose(1, 2, 3, yaw_deg=70), pose(1, 5, 7)) == 5.0
+
+
+def test_inlier_scores_by_hand():
+    # residuals along x: truth moves by 0, the estimate by 1
+    source = np.zeros((5, 3))
+    target = np.zeros((5, 3))
+    target[:, 0] = [0.0, 0.4, 0.5, 1.0, 9.0]
+    # within 0.55 of the truth: rows 0 1 2; of the estimate: rows 2 3 (row 1 is 0.6 away)
+    scores = metrics.inlier_scores(source, target, pose(x=1), pose(), 0.55)
+    assert scores.precision == pytest.approx(1 / 2)
+    assert scores.recall == pytest.approx(1 / 3)
+    assert scores.f1 == pytest.approx(0.4)
+
+
+def test_inlier_scores_are_zero_where_nothing_is_right():
+    far = metrics.inlier_scores(np.zeros((3, 3)), np.zeros((3, 3)), pose(x=9), pose(), 0.6)
+    assert (far.precision, far.recall, far.f1) == (0.0, 0.0, 0.0)
+
+
+def test_drift_of_a_scaled_straight_line_is_the_scale_error():
+    truth = np.array([pose(x=i) for i in range(21)])
+    estimate = np.array([pose(x=1.02 * i) for i in range(21)])
+    drift = metrics.drift(estimate, truth, (5.0, 10.0, 50.0))
+    assert drift.translation_percent == pytest.approx(2.0)
+    assert drift.rotation_deg_per_m == pytest.approx(0.0, abs=1e-9)
+    assert drift.stretches == 16 + 11    # the 50 m do not fit
+
+
+def test_drift_of_a_turning_estimate():
+    truth = np.array([pose(x=i) for i in range(11)])
+    estimate = np.array([pose(x=i, yaw_deg=0.1 * i) for i in range(11)])
+    drift = metrics.drift(estimate, truth, (10.0,))
+    assert drift.rotation_deg_per_m == pytest.approx(0.1)
+    # the end is where it should be in the first frame, and so it is in the last
+    assert drift.translation_percent == pytest.approx(0.0, abs=1e-9)
+
+
+def test_drift_does_not_see_the_frame_of_the_trajectory():
+    truth = np.array([pose(x=math.cos(a), y=math.sin(a), yaw_deg=math.degrees(a))
+                      for a in np.linspace(0, 6, 50)])
+    drift = metrics.drift(pose(3, 4, 5, yaw_deg=33) @ truth, truth, (1.0, 2.0))
+    assert drift.stretches > 0
+    assert drift.translation_percent == pytest.approx(0.0, abs=1e-9)
+    assert drift.rotation_deg_per_m == pytest.approx(0.0, abs=1e-6)
+
+
+def test_drift_without_a_stretch_is_not_a_number():
+    drift = metrics.drift(np.array([pose()]), np.array([pose()]))
+    assert math.isnan(drift.translation_percent)
+    assert drift.stretches == 0
+    with pytest.raises(InputError, match=r'\(2, 4, 4\)'):
+        metrics.drift(np.zeros((2, 4, 4)), np.zeros((3, 4, 4)))
+
+
+def test_consecutive_errors_blame_the_step_that_is_wrong():
+    truth = np.array([pose(x=i) for i in range(4)])
+    estimate = truth.copy()
+    estimate[2:] = [pose(2.3, yaw_deg=2), pose(2.3) @ pose(yaw_deg=2) @ pose(1)]
+    rotation, translation = metrics.consecutive_errors(estimate, truth)
+    assert rotation == pytest.approx([0, 2, 0], abs=1e-6)
+    assert translation == pytest.approx([0, 0.3, 0], abs=1e-9)
