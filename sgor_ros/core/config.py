@@ -58,6 +58,11 @@ class SgorConfig(Settings):
     height_gate: float = setting(
         0.5, 'Match only points whose heights over the ground differ by less; 0: off '
         '(beyond the paper)', 'm', minimum=0.0, maximum=20.0)
+    context_weight: float = setting(
+        1.5, 'Weight of the semantic context beside the descriptor; 0: off (beyond the paper)',
+        minimum=0.0, maximum=100.0)
+    context_scale: float = setting(
+        1.5, 'Finest of the three scales of the semantic context', 'm', minimum=0.05, maximum=20.0)
     moving_vote: bool = setting(
         False, 'Let movable classes (people, moving cars) take part')
 
@@ -126,7 +131,7 @@ class SgorConfig(Settings):
     def indoor(cls) -> Self:
         """Return a preset for rooms and fragments of a few metres."""
         return cls(min_range=0.0, max_range=20.0, voxel_size=0.05, sigma_g=0.03,
-                   normal_radius=0.10, descriptor_radius=0.25, vote_radius=0.10,
+                   normal_radius=0.10, descriptor_radius=0.25, vote_radius=0.10, context_scale=0.15,
                    height_gate=0.0, key_spacing=0.1, sigma_d=0.10, tau_1=0.10,
                    ground_check=False, local_voxel_size=0.03, local_reach=0.10)
 
@@ -134,6 +139,7 @@ class SgorConfig(Settings):
     def paper(cls) -> Self:
         """Return the paper's steps and nothing besides."""
         return cls(robust_ground=False, match_within_labels=False, height_gate=0.0,
+                   context_weight=0.0,
                    moving_vote=True, weight_cutoff=6.0, refinement_rounds=1, drop_ground_labels=False,
                    local_refinement=False,
                    min_confidence=0.0)

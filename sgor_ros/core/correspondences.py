@@ -1,6 +1,6 @@
 """Semantic overlap region and feature matching (Sec. III-B, Eq. 4)."""
 from dataclasses import dataclass
-from dataclasses import replace
+from dataclasses import fields
 
 import numba
 import numpy as np
@@ -46,21 +46,32 @@ class Correspondences:
 
 @dataclass(frozen=True, eq=False)
 class Features:
-    """The keypoints of one scan that may be matched: columns of a `PreparedScan`."""
+    """The keypoints of one scan that may be matched.
+
+    Attributes
+    ----------
+    points : (V, 3) float64
+        Metres.
+    labels, regional : (V,) uint8
+        Class inside by vote of the voxel, and of the neighbourhood.
+    descriptors : (V, D) float32
+        Unit rows.
+    heights : (V,) float64 or None
+        Heights over the ground plane, metres; None without a ground plane.
+    context : (V, E) float32 or None
+        Semantic context, unit rows; None without a ground plane or where it is off.
+    """
 
     points: NDArray[np.float64]
     labels: NDArray[np.uint8]
     regional: NDArray[np.uint8]
     descriptors: NDArray[np.float32]
-    heights: NDArray[np.float64]
+    heights: NDArray[np.float64] | None = None
+    context: NDArray[np.float32] | None = None
 
     def __getitem__(self, rows: NDArray[np.intp] | NDArray[np.bool_]) -> 'Features':
-        return Features(self.points[rows], self.labels[rows], self.regional[rows],
-                        self.descriptors[rows], self.heights[rows])
-
-    def with_heights(self, heights: NDArray[np.float64]) -> 'Features':
-        """Return a copy with (V,) heights over the ground, metres."""
-        return replace(self, heights=heights)
+        columns = (getattr(self, f.name) for f in fields(self))
+        return Features(*(None if column is None else column[rows] for column in columns))
 
 
 def given_correspondences(source_points: ArrayLike, target_points: ArrayLike,
@@ -95,28 +106,38 @@ def overlap_region(source: Features, target: Features) -> tuple[Features, Featur
     return source[np.isin(source.labels, shared)], target[np.isin(target.labels, shared)]
 
 
-def match(source: Features, target: Features, config: SgorConfig, *,
-          by_height: bool) -> Correspondences:
+def match(source: Features, target: Features, config: SgorConfig) -> Correspondences:
     """Find for each source keypoint the target keypoint with the nearest descriptor.
 
-    One way, several to one allowed. `match_within_labels` and, where `by_height` says that both
-    scans have heights over the ground, `height_gate` narrow the search.
+    One way, several to one allowed. `match_within_labels` and, where both scans have a ground
+    plane, `height_gate` narrow the search, and the semantic context joins the descriptor.
+
+    Raises
+    ------
+    InputError
+        Descriptors of different lengths.
     """
-    gate = config.height_gate if by_height and config.height_gate > 0 else np.inf
+    if source.descriptors.shape[1] != target.descriptors.shape[1]:
+        raise InputError(f'descriptors: source has {source.descriptors.shape[1]} columns, target '
+                         f'{target.descriptors.shape[1]}')
+    none = source.heights is None or target.heights is None
+    source_heights = np.zeros(len(source.points)) if none else source.heights
+    target_heights = np.zeros(len(target.points)) if none else target.heights
+    gate = config.height_gate if config.height_gate > 0 else np.inf
     block = target.regional if config.match_within_labels else np.zeros_like(target.regional)
     wanted = source.regional if config.match_within_labels else np.zeros_like(source.regional)
     # sorted by label, then height, the candidates of a point stand in one run
-    order = np.lexsort((target.heights, block))
-    sorted_block, sorted_heights = block[order], target.heights[order]
-    descriptors = target.descriptors[order]
+    order = np.lexsort((target_heights, block))
+    sorted_block, sorted_heights = block[order], target_heights[order]
+    described, candidates = _joint_descriptors(source, target, config.context_weight)
     first, last = np.zeros(len(source.points), np.int64), np.zeros(len(source.points), np.int64)
     for label in np.unique(wanted):
         low, high = np.searchsorted(sorted_block, [label, int(label) + 1])
         rows = wanted == label
         run = sorted_heights[low:high]
-        first[rows] = low + np.searchsorted(run, source.heights[rows] - gate)
-        last[rows] = low + np.searchsorted(run, source.heights[rows] + gate, side='right')
-    nearest = _nearest_in_runs(source.descriptors, descriptors, first, last)
+        first[rows] = low + np.searchsorted(run, source_heights[rows] - gate)
+        last[rows] = low + np.searchsorted(run, source_heights[rows] + gate, side='right')
+    nearest = _nearest_in_runs(described, candidates[order], first, last)
     found = np.flatnonzero(nearest >= 0)
     found = found[thin(found.size, config.max_correspondences)]
     s, t = source[found], target[order[nearest[found]]]
@@ -128,6 +149,18 @@ def thin(count: int, most: int) -> NDArray[np.intp]:
     if count <= most:
         return np.arange(count)
     return np.linspace(0, count - 1, most).astype(np.intp)
+
+
+def _joint_descriptors(source: Features, target: Features, context_weight: float
+                       ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Append the weighted context columns that are not empty, where both scans have any."""
+    p, q = source.context, target.context
+    if p is None or q is None or p.shape[1] != q.shape[1]:
+        return source.descriptors, target.descriptors
+    used = p.any(axis=0) & q.any(axis=0)
+    weight = np.float32(context_weight)
+    return (np.hstack((source.descriptors, weight * p[:, used])),
+            np.hstack((target.descriptors, weight * q[:, used])))
 
 
 def _voted(points: NDArray[np.float64], ids: NDArray[np.int64], convention: LabelConvention,

@@ -1,4 +1,6 @@
 """`preprocess`: everything of one scan that does not depend on the other (Sec. III-B)."""
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import ArrayLike
 from numpy.typing import NDArray
@@ -7,6 +9,8 @@ from scipy.spatial import cKDTree
 from .alignment import surface
 from .checks import finite_points
 from .config import SgorConfig
+from .context import context_classes
+from .context import semantic_context
 from .correspondences import Features
 from .features import fpfh
 from .features import normals
@@ -68,7 +72,8 @@ def preprocess(scan: SemanticScan, config: SgorConfig | None = None, *,
     if ground is None:
         warnings.append('no ground plane found: no ground check')
     else:
-        features = features.with_heights(ground.heights(features.points))
+        with clock('context'):
+            features = _over_ground(features, ground, convention, config)
         if ground.source == 'geometry':
             warnings.append('no ground labels: ground plane found by geometry')
     with clock('surface'):
@@ -120,7 +125,17 @@ def _describe(cloud: VoxelCloud, config: SgorConfig, clock: Stopwatch) -> Featur
         directions = normals(cloud.points, neighbours, config.normal_radius)
     with clock('descriptors'):
         described = fpfh(cloud.points, directions, neighbours)
-    return Features(cloud.points, cloud.labels, regional, described, np.zeros(len(cloud.points)))
+    return Features(cloud.points, cloud.labels, regional, described)
+
+
+def _over_ground(features: Features, ground: Ground, convention: LabelConvention,
+                 config: SgorConfig) -> Features:
+    """Add what needs a ground plane: heights over it and the semantic context."""
+    heights = ground.heights(features.points)
+    if config.context_weight == 0:
+        return replace(features, heights=heights)
+    return replace(features, heights=heights, context=semantic_context(
+        features.points, features.regional, ground, context_classes(convention), config))
 
 
 def _given(keypoints: ArrayLike | None, descriptors: ArrayLike | None, cloud: VoxelCloud,
@@ -139,4 +154,4 @@ def _given(keypoints: ArrayLike | None, descriptors: ArrayLike | None, cloud: Vo
     rows = np.flatnonzero(keep[nearest])
     nearest = nearest[rows]
     return Features(points[rows], cloud.labels[nearest], regional[nearest],
-                    unit_rows(described[rows]), np.zeros(len(rows)))
+                    unit_rows(described[rows]))

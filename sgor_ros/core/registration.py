@@ -55,9 +55,9 @@ def register(source: SemanticScan | PreparedScan, target: SemanticScan | Prepare
         p, q = source.features, target.features
         if config.correspondence_preprocessing:
             p, q = overlap_region(p, q)
-        grounds = (source.ground and target.ground) and (source.ground, target.ground)
-        correspondences = match(p, q, config, by_height=grounds is not None)
-    normals = grounds and (grounds[0].normal, grounds[1].normal)
+        correspondences = match(p, q, config)
+    normals = (None if source.ground is None or target.ground is None
+               else (source.ground.normal, target.ground.normal))
     result = solve(correspondences, normals, config, clock)
     with clock('alignment'):
         if result.success and source.surface and target.surface:
