@@ -1,0 +1,202 @@
+"""ROS parameters and their YAML files, derived from the settings and from nothing else.
+
+``python -m sgor_ros.ros.parameters`` prints ``config/sgor_node.yaml``; with a folder as argument
+it writes that file and the presets there.
+"""
+from collections.abc import Iterable
+from dataclasses import asdict
+from dataclasses import dataclass
+import math
+from pathlib import Path
+import sys
+import textwrap
+
+from rcl_interfaces.msg import FloatingPointRange
+from rcl_interfaces.msg import IntegerRange
+from rcl_interfaces.msg import ParameterDescriptor
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.exceptions import InvalidParameterTypeException
+from rclpy.exceptions import ParameterException
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+from ..core.config import SgorConfig
+from ..core.labels import label_convention
+from ..core.settings import InputError
+from ..core.settings import Setting
+from ..core.settings import setting
+from ..core.settings import Settings
+from ..core.settings import Value
+from ..tracker import TrackerConfig
+
+LARGEST_INTEGER = 2**31 - 1
+
+
+@dataclass(frozen=True)
+class NodeConfig(Settings):
+    """What only the node needs to know; fixed while it runs."""
+
+    label_field: str = setting(
+        'label', 'Field of the clouds that holds the class ids; empty: work without labels')
+    odom_frame: str = setting(
+        'odom', 'Frame of the published poses; its origin is the first scan')
+    sensor_frame: str = setting(
+        '', 'Frame of the sensor in what is published; empty: the frame_id of each scan')
+    reliability: str = setting(
+        'auto', 'QoS of the subscription; auto: reliable, which loses no large clouds, until a '
+        'publisher turns up that is best effort only', choices=('auto', 'reliable', 'best_effort'))
+    publish_tf: bool = setting(
+        False, 'Publish the transform from odom_frame to the sensor frame on /tf')
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not self.odom_frame:
+            raise InputError("odom_frame = '': a frame needs a name")
+        for name in ('odom_frame', 'sensor_frame'):
+            if getattr(self, name).startswith('/'):
+                raise InputError(f'{name} = {getattr(self, name)!r}: frame ids have no leading '
+                                 'slash')
+
+
+class NodeParameters:
+    """The parameters of a node, declared and kept in step with the configurations.
+
+    Attributes
+    ----------
+    node_config : NodeConfig
+    live : (SgorConfig, TrackerConfig)
+        The newest; replaced as a whole, so any thread may read it.
+    """
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+        self.node_config = NodeConfig.from_values(_declare(node, NodeConfig, read_only=True))
+        self.live = (SgorConfig.from_values(_declare(node, SgorConfig)),
+                     TrackerConfig.from_values(_declare(node, TrackerConfig)))
+        label_convention(self.live[0].label_convention)
+        _warn_of_unknown(node)
+        node.add_on_set_parameters_callback(self._check)
+        node.add_post_set_parameters_callback(self._apply)
+
+    def _check(self, parameters: list[Parameter]) -> SetParametersResult:
+        """Refuse values that do not go together; rclpy has checked each type and range."""
+        try:
+            self._changed(parameters)
+        except InputError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        return SetParametersResult(successful=True)
+
+    def _apply(self, parameters: list[Parameter]) -> None:
+        before = self.live
+        self.live = self._changed(parameters)
+        if self.live != before:
+            changes = ', '.join(f'{item.name} = {item.value}' for item in parameters)
+            self._node.get_logger().info(f'from the next scan on: {changes}')
+
+    def _changed(self, parameters: list[Parameter]) -> tuple[SgorConfig, TrackerConfig]:
+        sgor, tracker = self.live
+        sgor = sgor.replace(**_values_of(sgor, parameters))
+        label_convention(sgor.label_convention)
+        return sgor, tracker.replace(**_values_of(tracker, parameters))
+
+
+def _values_of(config: Settings, parameters: list[Parameter]) -> dict[str, Value]:
+    names = [item.name for item in config.settings()]
+    return {item.name: item.value for item in parameters if item.name in names}
+
+
+def _declare(node: Node, config: type[Settings], read_only: bool = False) -> dict[str, Value]:
+    """Declare all settings of a configuration and return the values that the user gave them."""
+    try:
+        return {item.name: node.declare_parameter(
+            item.name, item.default, _descriptor(item, read_only)).value
+            for item in config.settings()}
+    except InvalidParameterTypeException as error:
+        raise InputError(f'{error} (a double needs its point: 3.0, not 3)') from error
+    except ParameterException as error:
+        raise InputError(str(error)) from error
+
+
+def _descriptor(item: Setting, read_only: bool) -> ParameterDescriptor:
+    descriptor = ParameterDescriptor(description=item.description, read_only=read_only)
+    if item.choices:
+        descriptor.additional_constraints = f'one of {", ".join(item.choices)}'
+    if item.minimum is None and item.maximum is None:
+        return descriptor
+    if item.kind is float:
+        descriptor.floating_point_range = [FloatingPointRange(
+            from_value=-math.inf if item.minimum is None else float(item.minimum),
+            to_value=math.inf if item.maximum is None else float(item.maximum))]
+    else:
+        descriptor.integer_range = [IntegerRange(
+            from_value=-LARGEST_INTEGER if item.minimum is None else int(item.minimum),
+            to_value=LARGEST_INTEGER if item.maximum is None else int(item.maximum))]
+    return descriptor
+
+
+def _warn_of_unknown(node: Node) -> None:
+    """Name what the user set and the node does not have: rclpy drops it without a word."""
+    for name in node._parameter_overrides:
+        if not node.has_parameter(name) and not name.startswith('qos_overrides.'):
+            node.get_logger().warning(f'parameter {name}: there is none of that name; ignored')
+
+
+def yaml_files() -> dict[str, str]:
+    """Return the parameter files of config/: name to content."""
+    indoor = _differences(SgorConfig.indoor())
+    keyframe = _differences(TrackerConfig(mode='keyframe'))
+    return {
+        'sgor_node.yaml': _yaml(
+            'All parameters of sgor_node with their defaults.',
+            ('Registration; these can be changed while the node runs', SgorConfig.settings(), {}),
+            ('Tracker; these can be changed while the node runs', TrackerConfig.settings(), {}),
+            ('Node; read when it starts', NodeConfig.settings(), {})),
+        'indoor.yaml': _yaml(
+            'Rooms of a few metres: what differs from the defaults.',
+            ('SgorConfig.indoor()', _named(SgorConfig, indoor), indoor)),
+        'keyframe.yaml': _yaml(
+            'Register to keyframes: what differs from the defaults.',
+            ('Tracker', _named(TrackerConfig, keyframe), keyframe))}
+
+
+def _differences(config: Settings) -> dict[str, Value]:
+    defaults = asdict(type(config)())
+    return {name: value for name, value in asdict(config).items() if value != defaults[name]}
+
+
+def _named(config: type[Settings], names: Iterable[str]) -> list[Setting]:
+    return [item for item in config.settings() if item.name in names]
+
+
+def _yaml(title: str, *sections: tuple[str, Iterable[Setting], dict[str, Value]]) -> str:
+    lines = [f'# {title}',
+             '# Made by `python -m sgor_ros.ros.parameters config`. Doubles need their point: '
+             '3.0, not 3.',
+             '/**:', '  ros__parameters:']
+    for heading, settings, values in sections:
+        lines += ['', f'    # ---- {heading} ----']
+        for item in settings:
+            lines += textwrap.wrap(item.description + _bounds(item), 99, initial_indent='    # ',
+                                   subsequent_indent='    # ')
+            lines.append(f'    {item.name}: {_scalar(values.get(item.name, item.default))}')
+    return '\n'.join(lines) + '\n'
+
+
+def _bounds(item: Setting) -> str:
+    if item.minimum is None or item.maximum is None:
+        return ''
+    return f'; from {item.minimum:.6g} to {item.maximum:.6g}'
+
+
+def _scalar(value: Value) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    return f"'{value}'" if isinstance(value, str) else repr(value)
+
+
+if __name__ == '__main__':
+    if len(sys.argv) > 1:
+        for file_name, content in yaml_files().items():
+            (Path(sys.argv[1]) / file_name).write_text(content)
+    else:
+        print(yaml_files()['sgor_node.yaml'], end='')

@@ -1,0 +1,56 @@
+"""What the node says about itself: counts, and the message on /diagnostics."""
+from dataclasses import dataclass
+
+from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticStatus
+from diagnostic_msgs.msg import KeyValue
+
+from ..io.messages import header
+from ..tracker import TrackedScan
+from .types import ros_type
+
+OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
+
+
+@dataclass
+class Counts:
+    """Scans since the start: received = processed + failed + replaced + the one at work."""
+
+    received: int = 0
+    processed: int = 0
+    replaced: int = 0
+    failed: int = 0
+
+    def __str__(self) -> str:
+        return ', '.join(f'{name} {count}' for name, count in vars(self).items())
+
+
+def diagnostics(name: str, frame: str, stamp_ns: int, level: bytes, message: str, counts: Counts,
+                values: dict[str, str]) -> DiagnosticArray:
+    """Return one status, with the counts and `values`, at a stamp."""
+    pairs = {**{key: str(count) for key, count in vars(counts).items()}, **values}
+    return DiagnosticArray(
+        header=header(ros_type, stamp_ns, frame),
+        status=[DiagnosticStatus(
+            level=level, name=f'{name}: odometry', message=message, hardware_id=frame,
+            values=[KeyValue(key=key, value=value) for key, value in pairs.items()])])
+
+
+def judged(tracked: TrackedScan) -> tuple[bytes, str]:
+    """Return the level of a scan and why."""
+    if not tracked.success:
+        return ERROR, f'registration failed: {tracked.reason}'
+    if tracked.warnings:
+        return WARN, '; '.join(tracked.warnings)
+    return OK, 'first scan of a track' if tracked.restarted else 'registered'
+
+
+def details(tracked: TrackedScan) -> dict[str, str]:
+    """Return what a person wants to see of a scan, as text."""
+    step = tracked.registration
+    shown = {'reason': tracked.reason}
+    if step is not None:
+        shown['confidence'] = f'{step.confidence:.3f}'
+        shown['inliers'] = str(int(step.inliers.sum()))
+        shown['correspondences'] = str(len(step.inliers))
+    return shown

@@ -1,0 +1,410 @@
+"""The node as users have it: a process of its own, real DDS, real clouds."""
+from importlib.util import find_spec
+import signal
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from rcl_interfaces.msg import Parameter as ParameterMessage
+from rcl_interfaces.srv import DescribeParameters
+from rcl_interfaces.srv import SetParameters
+from rclpy.parameter import Parameter
+from rclpy.qos import ReliabilityPolicy
+import ros_helpers as ros
+from ros_helpers import status
+from std_srvs.srv import Trigger
+from visualization_msgs.msg import Marker
+from visualization_msgs.msg import MarkerArray
+
+from sgor_ros import SgorConfig
+from sgor_ros import TrackerConfig
+from sgor_ros.ros.parameters import NodeConfig
+from sgor_ros.ros.parameters import yaml_files
+from sgor_ros.world import Lidar
+from sgor_ros.world import simulate
+
+OK, WARN, ERROR = b'\x00', b'\x01', b'\x02'
+SECOND = 1_000_000_000
+SMALL = Lidar(beams=32, columns=600)
+TOLERANCE_M, TOLERANCE_RAD = 0.15, 0.01
+UINT8, FLOAT32, FLOAT64 = 2, 7, 8
+
+
+@pytest.fixture(scope='module')
+def street():
+    """Return the first scans of a drive: [(stamp in ns, points, labels, true pose)]."""
+    return [(100 * SECOND + round(stamp * SECOND), points, labels, pose)
+            for stamp, points, labels, pose in simulate(8, seed=0, lidar=SMALL)]
+
+
+@pytest.fixture(scope='module')
+def domain():
+    domain = ros.Domain()
+    yield domain
+    domain.close()
+
+
+@pytest.fixture(scope='module')
+def shared_node(domain, tmp_path_factory):
+    node = ros.NodeProcess(domain, tmp_path_factory.mktemp('node') / 'log')
+    yield node
+    node.stop()
+
+
+@pytest.fixture(scope='module')
+def shared_partner(domain, shared_node):
+    partner = ros.Partner(domain)
+    partner.wait_for_node()
+    yield partner
+    partner.close()
+
+
+@pytest.fixture
+def partner(shared_partner, shared_node):
+    """Start with a node that has forgotten what other tests sent; it must survive the test."""
+    shared_partner.spin_for(0.1)
+    assert shared_partner.call(Trigger, '/reset', Trigger.Request()).success
+    shared_partner.forget()
+    yield shared_partner
+    assert shared_node.alive(), shared_node.log()
+
+
+def clouds_of(scans):
+    return [ros.cloud(points, labels, stamp) for stamp, points, labels, _ in scans]
+
+
+def assert_right(odometry, scan, first):
+    true = np.linalg.inv(first[3]) @ scan[3]
+    metres, radians = ros.difference(ros.matrix(odometry.pose.pose), true)
+    assert metres < TOLERANCE_M
+    assert radians < TOLERANCE_RAD
+
+
+def test_each_scan_gives_odometry_and_pose_with_its_stamp(partner, street):
+    for cloud in clouds_of(street):
+        assert partner.outcome(cloud)[0] == OK
+    partner.spin_until(lambda: len(partner.poses) == len(partner.odometry) == len(street))
+    for odometry, pose, scan in zip(partner.odometry, partner.poses, street, strict=True):
+        for header in (odometry.header, pose.header):
+            assert ros.stamp_ns_of(header) == scan[0]
+            assert header.frame_id == 'odom'
+        assert odometry.child_frame_id == 'lidar'
+        assert pose.pose == odometry.pose.pose
+        assert_right(odometry, scan, street[0])
+    # 6 m/s straight ahead, and a covariance that is one
+    assert partner.odometry[-1].twist.twist.linear.x == pytest.approx(6.0, abs=0.6)
+    assert (np.linalg.eigvalsh(partner.odometry[-1].pose.covariance.reshape(6, 6)) > 0).all()
+
+
+def test_diagnostics_add_up(partner, street):
+    values = [partner.outcome(cloud)[2] for cloud in clouds_of(street[:3])]
+    counts = [{name: int(value[name]) for name in ('received', 'processed', 'replaced', 'failed')}
+              for value in values]
+    for count in counts:
+        assert count['received'] == count['processed'] + count['replaced'] + count['failed']
+    assert counts[2]['processed'] - counts[0]['processed'] == 2
+    assert float(values[2]['confidence']) > 0.5
+    assert 10 < int(values[2]['inliers']) <= int(values[2]['correspondences'])
+    assert 0 < float(values[2]['seconds']) <= float(values[2]['latency'])
+
+
+def test_newest_scan_wins_under_overload(partner, street):
+    first = int(partner.outcome(clouds_of(street)[0])[2]['received'])
+    burst = clouds_of(street[1:] * 3)
+    for index, cloud in enumerate(burst):
+        cloud.header.stamp.sec = 200
+        cloud.header.stamp.nanosec = 10_000_000 * index
+    partner.play(burst, 0.01)
+    last = ros.stamp_ns_of(burst[-1].header)
+    partner.spin_until(
+        lambda: partner.diagnostics
+        and ros.stamp_ns_of(partner.diagnostics[-1].header) == last)
+    values = status(partner.diagnostics[-1])[2]
+    assert int(values['replaced']) > 0
+    assert int(values['received']) > first + len(burst) // 2
+    assert int(values['received']) == sum(int(values[name])
+                                          for name in ('processed', 'replaced', 'failed'))
+    stamps = [ros.stamp_ns_of(message.header) for message in partner.diagnostics]
+    assert stamps == sorted(stamps)
+
+
+def test_markers_for_those_who_listen(partner, street):
+    seen = []
+    listener = partner.node.create_subscription(MarkerArray, '/correspondences', seen.append, 1)
+    partner.spin_until(lambda: partner.node.count_publishers('/correspondences') == 1)
+    partner.spin_for(ros.SETTLING_S)
+    first, second = clouds_of(street[:2])
+    partner.outcome(first)
+    values = partner.outcome(second)[2]
+    partner.spin_until(lambda: len(seen) == 2)
+    partner.node.destroy_subscription(listener)
+    assert [marker.action for marker in seen[0].markers] == [Marker.DELETEALL]
+    lines = {marker.ns: marker for marker in seen[1].markers}
+    assert set(lines) == {'inliers', 'rejected'}
+    assert 0 < len(lines['inliers'].points) <= 2 * int(values['inliers'])
+    for marker in lines.values():
+        assert marker.header.frame_id == 'odom'
+        assert ros.stamp_ns_of(marker.header) == street[1][0]
+    # inliers join what is the same place: short lines
+    ends = np.array([[p.x, p.y, p.z] for p in lines['inliers'].points]).reshape(-1, 2, 3)
+    assert np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1).max() < SgorConfig().tau_1
+
+
+def test_reset_makes_the_next_scan_the_origin(partner, street):
+    for cloud in clouds_of(street[:3]):
+        partner.outcome(cloud)
+    assert partner.call(Trigger, '/reset', Trigger.Request()).success
+    for cloud in clouds_of(street[5:7]):
+        partner.outcome(cloud)
+    partner.spin_until(lambda: len(partner.odometry) == 5)
+    np.testing.assert_array_equal(ros.matrix(partner.odometry[3].pose.pose), np.eye(4))
+    assert_right(partner.odometry[4], street[6], street[5])
+
+
+def set_parameter(partner, name, value):
+    message: ParameterMessage = Parameter(name, value=value).to_parameter_msg()
+    answer = partner.call(SetParameters, '/sgor_node/set_parameters',
+                          SetParameters.Request(parameters=[message]))
+    return answer.results[0]
+
+
+def test_a_parameter_changed_on_the_way_takes_effect(partner, street):
+    first, second, third, fourth = clouds_of(street[:4])
+    partner.outcome(first)
+    assert int(partner.outcome(second)[2]['correspondences']) > 60
+    assert set_parameter(partner, 'max_correspondences', 60).successful
+    assert int(partner.outcome(third)[2]['correspondences']) <= 60
+    assert set_parameter(partner, 'max_correspondences', 8000).successful
+    assert set_parameter(partner, 'mode', 'keyframe').successful
+    level, _, values = partner.outcome(fourth)
+    assert level == OK
+    assert int(values['correspondences']) > 60
+    assert set_parameter(partner, 'mode', 'consecutive').successful
+
+
+@pytest.mark.parametrize(('name', 'value', 'words'), [
+    ('sigma_g', 9.0, ['sigma_g', '9.0', '5.0']),
+    ('sigma_theta', float('nan'), ['sigma_theta', 'nan']),
+    ('groups', 0, ['groups', '0', '5000']),
+    ('sigma_d', 1, ['DOUBLE', 'INTEGER']),
+    ('semantics', 'fuzzy', ['semantics', 'fuzzy', 'loose, hard, none']),
+    ('normal_radius', 4.0, ['normal_radius = 4.0', 'descriptor_radius = 3.5']),
+    ('label_convention', 'mine', ['mine', 'semantickitti']),
+    ('label_field', 'class', ['read-only', 'label_field']),
+])
+def test_a_refused_parameter_says_why(partner, name, value, words):
+    result = set_parameter(partner, name, value)
+    assert not result.successful
+    for word in words:
+        assert word in result.reason
+
+
+def test_parameters_carry_meaning_unit_and_range(partner):
+    settings = {item.name: item for config in (SgorConfig, TrackerConfig, NodeConfig)
+                for item in config.settings()}
+    answer = partner.call(DescribeParameters, '/sgor_node/describe_parameters',
+                          DescribeParameters.Request(names=list(settings)))
+    for descriptor, item in zip(answer.descriptors, settings.values(), strict=True):
+        assert descriptor.description == item.description
+        limits = [*descriptor.floating_point_range, *descriptor.integer_range]
+        assert [(x.from_value, x.to_value) for x in limits] == (
+            [] if item.minimum is None else [(item.minimum, item.maximum)])
+        assert descriptor.read_only == (item.name in NodeConfig.__dataclass_fields__)
+
+
+def without_label(cloud):
+    cloud.fields = [field for field in cloud.fields if field.name != 'label']
+
+
+def empty(cloud):
+    cloud.width = cloud.row_step = 0
+    cloud.data = cloud.data[:0]
+
+
+def truncated(cloud):
+    cloud.data = cloud.data[:-100]
+
+
+def field_of_type(datatype):
+    def change(cloud):
+        cloud.fields[-1].datatype = datatype
+    return change
+
+
+def all_nan(cloud):
+    cloud.data[:] = type(cloud.data)('B', np.full(len(cloud.data) // 4, np.nan, '<f4').tobytes())
+
+
+@pytest.mark.parametrize(('spoil', 'words'), [
+    (without_label, ['label', 'x, y, z']),
+    (empty, ['0', 'empty']),
+    (all_nan, ['finite']),
+    (truncated, ['data', 'bytes']),
+    (field_of_type(FLOAT64), ['label', 'point_step']),
+    (field_of_type(FLOAT32), ['label', 'not a whole number']),
+    (field_of_type(99), ['label', '99']),
+], ids=['no label field', 'no points', 'all NaN', 'truncated', 'label too wide', 'label a fraction',
+        'label of no type'])
+def test_a_bad_cloud_is_named_and_the_node_goes_on(partner, shared_node, street, spoil, words):
+    first, bad, good = clouds_of(street[:3])
+    spoil(bad)
+    assert partner.outcome(first)[0] == OK
+    level, message, values = partner.outcome(bad)
+    assert level == ERROR
+    for word in words:
+        assert word in message
+    assert message in shared_node.log()
+    assert partner.outcome(good)[0] == OK
+    partner.spin_until(lambda: len(partner.odometry) == 2)
+    assert ros.stamp_ns_of(partner.odometry[1].header) == street[2][0]
+    assert_right(partner.odometry[1], street[2], street[0])
+
+
+@pytest.mark.parametrize('rows', [slice(1), slice(40)], ids=['one point', 'forty points'])
+def test_too_few_points_fail_without_a_pose(partner, street, rows):
+    first, _, good = clouds_of(street[:3])
+    stamp, points, labels, _ = street[1]
+    assert partner.outcome(first)[0] == OK
+    level, message, values = partner.outcome(ros.cloud(points[rows], labels[rows], stamp))
+    assert level == ERROR
+    assert values['reason']
+    assert values['reason'] in message
+    assert partner.outcome(good)[0] == OK
+    partner.spin_until(lambda: len(partner.odometry) == 2)
+    assert_right(partner.odometry[1], street[2], street[0])
+
+
+def test_time_that_runs_backwards_starts_anew(partner, shared_node, street):
+    late, early, next_one = clouds_of([street[4], street[0], street[1]])
+    partner.outcome(late)
+    level, message, _ = partner.outcome(early)
+    assert level == WARN
+    assert 'time ran backwards by 0.400 s' in message
+    assert 'time ran backwards by 0.400 s' in shared_node.log()
+    assert partner.outcome(next_one)[0] == OK
+    partner.spin_until(lambda: len(partner.odometry) == 3)
+    np.testing.assert_array_equal(ros.matrix(partner.odometry[1].pose.pose), np.eye(4))
+    assert_right(partner.odometry[2], street[1], street[0])
+
+
+def test_a_scan_twice_stays_where_it_is(partner, street):
+    first, second, third = clouds_of(street[:3])
+    for cloud in (first, second, second, third):
+        assert partner.outcome(cloud)[0] == OK
+    partner.spin_until(lambda: len(partner.odometry) == 4)
+    again, before = (ros.matrix(partner.odometry[k].pose.pose) for k in (2, 1))
+    assert ros.difference(again, before)[0] < 1e-3
+    assert partner.odometry[2].twist.twist.linear.x == 0.0
+    assert_right(partner.odometry[3], street[2], street[0])
+
+
+def test_labels_of_an_unknown_class_are_named_once(partner, shared_node, street):
+    stamp, points, labels, _ = street[0]
+    for step in range(2):
+        strange = np.where(np.arange(len(labels)) < 50, 23456, labels)
+        level, message, _ = partner.outcome(
+            ros.cloud(points, strange, stamp + step * SECOND // 10))
+        assert level == WARN
+        assert '23456' in message
+    assert shared_node.log().count('23456') == 1
+
+
+def test_real_scans_at_ten_hertz(partner, data_folder):
+    folder = data_folder / 'kitti/08'
+    clouds = []
+    for index in range(10):
+        points = np.fromfile(folder / f'velodyne/{index:06d}.bin', np.float32).reshape(-1, 4)
+        labels = np.fromfile(folder / f'labels/{index:06d}.label', np.uint32)
+        clouds.append(ros.cloud(points[:, :3], labels, 100 * SECOND + index * SECOND // 10))
+    partner.play(clouds, 0.1)
+    partner.spin_until(lambda: len(partner.odometry) == len(clouds))
+    assert [ros.stamp_ns_of(message.header) for message in partner.odometry] == [
+        ros.stamp_ns_of(cloud.header) for cloud in clouds]
+    calibration = dict(line.split(':') for line in
+                       (folder / 'calib.txt').read_text().splitlines() if ':' in line)
+    Tr = np.vstack((np.array(calibration['Tr'].split(), float).reshape(3, 4), [0, 0, 0, 1]))
+    P = np.loadtxt(folder / 'poses.txt').reshape(-1, 3, 4)
+    first, last = (np.linalg.inv(Tr) @ np.vstack((P[k], [0, 0, 0, 1])) @ Tr for k in (0, 9))
+    metres, radians = ros.difference(ros.matrix(partner.odometry[-1].pose.pose),
+                                     np.linalg.inv(first) @ last)
+    assert metres < 0.3
+    assert np.degrees(radians) < 1.0
+
+
+@pytest.mark.parametrize('how', [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_at_work_ends_it_cleanly(domain, street, tmp_path, how):
+    node = ros.NodeProcess(domain, tmp_path / 'log', '-r', '__ns:=/ending')
+    partner = ros.Partner(domain, '/ending/')
+    try:
+        partner.wait_for_node()
+        partner.play(clouds_of(street[:4]), 0.02)
+    finally:
+        code = node.stop(how)
+        partner.close()
+    assert code == 0
+    last = node.log().splitlines()[-1]
+    assert last.startswith('received 4, processed ')
+    assert 'Traceback' not in node.log()
+
+
+def test_users_files_namespace_and_a_best_effort_driver(domain, street, tmp_path):
+    """Two files, the later one wins; the driver is best effort, time is the bag's."""
+    mine = tmp_path / 'mine.yaml'
+    mine.write_text('/**:\n  ros__parameters:\n    odom_frame: start\n    sensor_frame: velodyne\n'
+                    '    sigma_gg: 1.0\n    use_sim_time: true\n')
+    node = ros.NodeProcess(domain, tmp_path / 'log', '--params-file', 'config/sgor_node.yaml',
+                           '--params-file', str(mine), '-r', '__ns:=/robot')
+    partner = None
+    try:
+        silent = ros.Partner(domain, '/unheard/')
+        silent.spin_until(lambda: 'no clouds on /robot/points yet' in node.log(), 60.0)
+        silent.close()
+        assert 'other topics with clouds: /unheard/points' in node.log()
+        assert 'sigma_gg' in node.log()
+        partner = ros.Partner(domain, '/robot/', ReliabilityPolicy.BEST_EFFORT)
+        partner.spin_until(lambda: 'best effort' in node.log())
+        partner.wait_for_node()
+        for cloud in clouds_of(street[:2]):
+            assert partner.outcome(cloud)[0] == OK
+        partner.spin_until(lambda: len(partner.odometry) == 2)
+        assert partner.odometry[1].header.frame_id == 'start'
+        assert partner.odometry[1].child_frame_id == 'velodyne'
+        assert_right(partner.odometry[1], street[1], street[0])
+    finally:
+        assert node.stop() == 0
+        if partner:
+            partner.close()
+
+
+def test_a_reliable_only_node_says_what_it_cannot_hear(domain, tmp_path):
+    node = ros.NodeProcess(domain, tmp_path / 'log', '-r', '__ns:=/strict', '-p',
+                           'reliability:=reliable')
+    partner = ros.Partner(domain, '/strict/', ReliabilityPolicy.BEST_EFFORT)
+    try:
+        partner.spin_until(lambda: 'incompatible QoS (RELIABILITY)' in node.log(), 60.0)
+    finally:
+        node.stop()
+        partner.close()
+
+
+@pytest.mark.parametrize(('argument', 'words'), [
+    ('sigma_g:=9.0', ['sigma_g', '9.0', '5.0']),
+    pytest.param('publish_tf:=true', ['publish_tf', 'ros-jazzy-tf2-msgs'], marks=pytest.mark.skipif(
+        find_spec('tf2_msgs') is not None, reason='tf2_msgs is installed')),
+])
+def test_what_cannot_work_ends_the_start_with_a_message(domain, argument, words):
+    ran = subprocess.run([sys.executable, '-m', 'sgor_ros.ros.node', '--ros-args', '-p', argument],
+                         env=domain.environment(), cwd=ros.ROOT, capture_output=True, text=True,
+                         timeout=60)
+    assert ran.returncode == 2
+    assert ran.stderr.startswith('error: ')
+    assert 'Traceback' not in ran.stderr
+    for word in words:
+        assert word in ran.stderr
+
+
+def test_yaml_files_are_what_the_settings_say():
+    for name, content in yaml_files().items():
+        assert (ros.ROOT / 'config' / name).read_text() == content, (
+            'run python -m sgor_ros.ros.parameters config')
