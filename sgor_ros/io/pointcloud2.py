@@ -42,7 +42,8 @@ def decode(message: Any, label_field: str) -> SemanticScan:
         points[:, axis] = records[name]
     if not label_field:
         return SemanticScan(points)
-    return SemanticScan(points, _whole_numbers(records[label_field], points, label_field))
+    return SemanticScan(points, whole_numbers(records[label_field], points,
+                                              f'field {label_field}'))
 
 
 def field_names(message: Any) -> list[str]:
@@ -89,15 +90,21 @@ def _format(message: Any, name: str) -> tuple[str, int]:
     return ('>' if message.is_bigendian else '<') + code, field.offset
 
 
-def _whole_numbers(labels: NDArray[Any], points: NDArray[np.float32],
-                   name: str) -> NDArray[np.int64]:
-    """Return labels as integers; floats must be whole where the point counts."""
+def whole_numbers(labels: NDArray[Any], points: NDArray[np.float32],
+                  name: str) -> NDArray[np.int64]:
+    """Return (N,) labels as integers; floats must be whole where the point is finite.
+
+    Raises
+    ------
+    InputError
+        Naming `name`, the label and the point.
+    """
     if labels.dtype.kind != 'f':
         return labels.astype(np.int64)
     labels = np.where(np.isfinite(points).all(axis=1), labels, 0)
     bad = np.flatnonzero(~(np.abs(labels - np.rint(labels)) < LABEL_ROUNDING))
     if bad.size:
-        raise InputError(f'field {name}: {labels[bad[0]]} at point {bad[0]} is not a whole '
+        raise InputError(f'{name}: {labels[bad[0]]} at point {bad[0]} is not a whole '
                          'number, so not a class id')
     return np.rint(labels).astype(np.int64)
 

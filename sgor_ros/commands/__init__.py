@@ -1,0 +1,1 @@
+"""The command lines: read files, drive the tracker, write results."""

@@ -1,0 +1,111 @@
+"""Command line options derived from the settings, and the frame around every command."""
+from argparse import ArgumentDefaultsHelpFormatter
+from argparse import ArgumentParser
+from argparse import BooleanOptionalAction
+from argparse import Namespace
+from argparse import SUPPRESS
+from collections.abc import Callable
+from collections.abc import Iterable
+from pathlib import Path
+import sys
+from typing import Any
+
+import yaml
+
+from ..core.settings import InputError
+from ..core.settings import Setting
+from ..core.settings import Settings
+
+REFUSED = 2
+INTERRUPTED = 130
+
+
+def parser(description: str) -> ArgumentParser:
+    """Return a parser whose help shows the defaults."""
+    return ArgumentParser(description=description, formatter_class=ArgumentDefaultsHelpFormatter)
+
+
+def run(command: Callable[[Namespace], int], arguments: Namespace) -> int:
+    """Run a command and return its exit code; what it refuses is told in one line."""
+    try:
+        return command(arguments)
+    except (InputError, OSError) as error:
+        print(f'error: {error}', file=sys.stderr)
+        return REFUSED
+    except KeyboardInterrupt:
+        return INTERRUPTED
+
+
+def add_settings(to: ArgumentParser, title: str, settings: Iterable[Setting]) -> None:
+    """Add an option for each setting: ``sigma_d`` becomes ``--sigma-d``."""
+    group = to.add_argument_group(title)
+    for item in settings:
+        details: dict[str, Any] = {'default': SUPPRESS, 'help': _help(item)}
+        if item.kind is bool:
+            details['action'] = BooleanOptionalAction
+        else:
+            details['type'] = item.kind
+            details['metavar'] = item.unit or item.kind.__name__.upper()
+        group.add_argument(f'--{item.name.replace("_", "-")}', **details)
+
+
+def add_params_file(to: ArgumentParser) -> None:
+    """Add the option for a YAML file as ROS nodes take it."""
+    to.add_argument('--params-file', type=Path, metavar='YAML', default=SUPPRESS,
+                    help='settings in the format of ROS parameter files; options go before')
+
+
+def configured[S: Settings](start: S, arguments: Namespace, parameters: dict[str, Any]) -> S:
+    """Return `start` changed by the parameters of a file and, before those, by options.
+
+    Raises
+    ------
+    InputError
+        A value that is refused.
+    """
+    changed = {}
+    for item in start.settings():
+        option = getattr(arguments, item.name, None)
+        if option is not None:
+            changed[item.name] = option
+        elif item.name in parameters:
+            changed[item.name] = parameters[item.name]
+    return start.replace(**changed)
+
+
+def read_parameters(arguments: Namespace, known: Iterable[Setting]) -> dict[str, Any]:
+    """Return the parameters of the ROS YAML file, of all its nodes together, if one was given.
+
+    Names that are not among the `known` settings get a warning: the file may serve a node, which
+    has more, or the name may be misspelt.
+
+    Raises
+    ------
+    InputError
+        No such file, or one of another format.
+    """
+    path = getattr(arguments, 'params_file', None)
+    if path is None:
+        return {}
+    try:
+        content = yaml.safe_load(path.read_text())
+        nodes = [node['ros__parameters'] for node in content.values()]
+        parameters = {name: value for node in nodes for name, value in node.items()}
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        raise InputError(f'--params-file {path}: cannot be read: {error}') from error
+    except (AttributeError, KeyError, TypeError) as error:
+        raise InputError(f'--params-file {path}: expected "/**: ros__parameters:" and settings '
+                         'below it') from error
+    unknown = sorted(parameters.keys() - {item.name for item in known})
+    if unknown:
+        print(f'warning: {path}: no settings of this command, so ignored: {", ".join(unknown)}',
+              file=sys.stderr)
+    return parameters
+
+
+def _help(item: Setting) -> str:
+    bounds = [f'at least {item.minimum:g}' if item.minimum is not None else '',
+              f'at most {item.maximum:g}' if item.maximum is not None else '']
+    default = f'{item.default:.6g}' if item.kind is float else str(item.default)
+    text = f'{item.description}; {", ".join(filter(None, [*bounds, f"default {default}"]))}'
+    return text.replace('%', '%%')

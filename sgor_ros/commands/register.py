@@ -1,0 +1,119 @@
+"""`sgor_register`: two scans from files, the transformation between them."""
+from argparse import ArgumentParser
+from argparse import Namespace
+import json
+import math
+from pathlib import Path
+import sys
+from typing import Any
+
+import numpy as np
+
+from ..core import se3
+from ..core.config import SgorConfig
+from ..core.preprocessing import preprocess
+from ..core.registration import register
+from ..core.scan import Registration
+from ..core.scan import SemanticScan
+from ..core.warmup import warm_up
+from ..io.plots import plot_registration
+from ..io.scans import read_scan
+from .options import add_params_file
+from .options import add_settings
+from .options import configured
+from .options import parser
+from .options import read_parameters
+from .options import run
+
+FAILED = 1
+PRESETS = {'outdoor': SgorConfig.outdoor, 'indoor': SgorConfig.indoor, 'paper': SgorConfig.paper}
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run the command and return its exit code."""
+    return run(register_files, _parser().parse_args(argv))
+
+
+def register_files(arguments: Namespace) -> int:
+    """Register and tell; 1 where the scans could not be registered."""
+    config = configured(PRESETS[arguments.preset](), arguments,
+                        read_parameters(arguments, SgorConfig.settings()))
+    convention = arguments.target_label_convention or config.label_convention
+    source = read_scan(arguments.source, arguments.source_labels)
+    target = read_scan(arguments.target, arguments.target_labels)
+    warm_up(config)
+    result = register(preprocess(source, config),
+                      preprocess(target, config.replace(label_convention=convention)), config)
+    for warning in result.warnings:
+        print(f'warning: {warning}', file=sys.stderr)
+    print(_text(result))
+    if arguments.json:
+        arguments.json.write_text(json.dumps(_as_dict(result, arguments), indent=2) + '\n')
+    if arguments.plot:
+        _plot(arguments, source, target, result)
+    return 0 if result.success else FAILED
+
+
+def _parser() -> ArgumentParser:
+    command = parser('Register two scans without an initial guess and print T_target_source, '
+                     'which maps points of the source into the target.')
+    command.add_argument('source', type=Path, help='.bin, .pcd, .ply or .npz')
+    command.add_argument('target', type=Path, help='likewise')
+    for side in ('source', 'target'):
+        command.add_argument(f'--{side}-labels', type=Path, metavar='FILE',
+                             help=f'labels of the {side}: uint32 or uint8 a point')
+    command.add_argument('--target-label-convention', metavar='STR',
+                         help='where the labels of the target mean something else')
+    command.add_argument('--preset', choices=list(PRESETS), default='outdoor',
+                         help='settings to start from')
+    command.add_argument('--json', type=Path, metavar='FILE', help='write the result to')
+    command.add_argument('--plot', type=Path, metavar='FILE', help='draw the result to (PNG)')
+    add_params_file(command)
+    add_settings(command, 'settings (defaults are those of the preset outdoor)',
+                 SgorConfig.settings())
+    return command
+
+
+def _text(result: Registration) -> str:
+    lines = []
+    if result.success and result.T_target_source is not None:
+        T = result.T_target_source
+        lines += ['T_target_source', *(' '.join(f'{v:14.9f}' for v in row) for row in T), '',
+                  f'registered: moved {np.linalg.norm(T[:3, 3]):.3f} m, '
+                  f'turned {math.degrees(se3.angle(T[:3, :3])):.3f} deg']
+    else:
+        lines.append(f'not registered: {result.reason}')
+    lines.append(f'confidence {result.confidence:.3f}, {int(result.inliers.sum())} inliers of '
+                 f'{len(result.inliers)} correspondences')
+    if result.success and result.covariance is not None:
+        sigma = np.sqrt(np.diag(result.covariance))
+        lines.append('standard deviation x y z ' + ' '.join(f'{100 * s:.1f}' for s in sigma[:3])
+                     + ' cm, rotation ' + ' '.join(f'{math.degrees(s):.3f}' for s in sigma[3:])
+                     + ' deg')
+    lines.append(f'took {1e3 * sum(result.timings.values()):.0f} ms')
+    return '\n'.join(lines)
+
+
+def _as_dict(result: Registration, arguments: Namespace) -> dict[str, Any]:
+    T, covariance = result.T_target_source, result.covariance
+    return {
+        'source': str(arguments.source), 'target': str(arguments.target),
+        'success': result.success, 'reason': result.reason, 'confidence': result.confidence,
+        # a refused candidate is nothing to build on
+        'T_target_source': T.tolist() if result.success and T is not None else None,
+        'covariance': None if covariance is None else covariance.tolist(),
+        'correspondences': len(result.inliers), 'inliers': int(result.inliers.sum()),
+        'evidence': result.evidence, 'warnings': list(result.warnings),
+        'timings_s': result.timings}
+
+
+def _plot(arguments: Namespace, source: SemanticScan, target: SemanticScan,
+          result: Registration) -> None:
+    title = (f'{arguments.source.name} to {arguments.target.name}: '
+             f'{"registered" if result.success else "not registered"}, '
+             f'confidence {result.confidence:.2f}')
+    plot_registration(arguments.plot, title, source, target, result)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

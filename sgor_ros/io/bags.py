@@ -1,0 +1,190 @@
+"""Bags without ROS, by rosbags: ROS 1 .bag, ROS 2 sqlite3 and mcap."""
+from collections.abc import Callable
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+from typing import Self
+
+from rosbags.highlevel import AnyReader
+from rosbags.interfaces import Connection
+from rosbags.rosbag2 import StoragePlugin
+from rosbags.rosbag2 import Writer
+from rosbags.rosbag2 import WriterError
+from rosbags.typesys import get_typestore
+from rosbags.typesys import Stores
+
+from ..core.settings import InputError
+from .messages import stamp_ns_of
+from .pointcloud2 import field_names
+
+CLOUD_TYPE = 'sensor_msgs/msg/PointCloud2'
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedCloud:
+    """One cloud as it lies in the bag; `read` may find it broken when the next one is not.
+
+    Attributes
+    ----------
+    bag_time_ns : int
+        When it was recorded.
+    read : function
+        Returns stamp in nanoseconds, frame id and the sensor_msgs/msg/PointCloud2. Raises
+        InputError where the bytes are no such message.
+    """
+
+    bag_time_ns: int
+    read: Callable[[], tuple[int, str, Any]]
+
+
+class BagReader:
+    """The clouds of a bag; use it in a ``with``.
+
+    Parameters
+    ----------
+    path : str or Path
+        Folder of a ROS 2 bag, or one file: .mcap, .db3 or .bag.
+
+    Raises
+    ------
+    InputError
+        No such bag, or one that cannot be read.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        self.path = Path(path)
+        if not self.path.exists():
+            raise InputError(f'{path}: no such bag')
+        with _readable(self.path):
+            self._reader = AnyReader(
+                [self.path], default_typestore=get_typestore(Stores.ROS2_JAZZY))
+
+    def __enter__(self) -> Self:
+        """Open the bag."""
+        with _readable(self.path):
+            self._reader.open()
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
+                 trace: TracebackType | None) -> None:
+        """Close the bag."""
+        self._reader.close()
+
+    def cloud_topics(self) -> dict[str, int]:
+        """Return the PointCloud2 topics that have messages, and how many."""
+        topics: dict[str, int] = {}
+        for connection in self._reader.connections:
+            if connection.msgtype == CLOUD_TYPE and connection.msgcount:
+                topics[connection.topic] = topics.get(connection.topic, 0) + connection.msgcount
+        return topics
+
+    def find_topic(self, label_field: str) -> str:
+        """Return the one topic of labelled clouds, or the one topic of clouds.
+
+        Raises
+        ------
+        InputError
+            There is none, or more than one.
+        """
+        topics = list(self.cloud_topics())
+        if len(topics) > 1 and label_field:
+            topics = [t for t in topics if label_field in self._first_fields(t)] or topics
+        if not topics:
+            others = sorted({c.topic for c in self._reader.connections})
+            raise InputError(f'{self.path}: no PointCloud2 in this bag; its topics are '
+                             f'{", ".join(others) or "none at all"}')
+        if len(topics) > 1:
+            raise InputError(f'{self.path}: several topics of clouds, choose one by --topic: '
+                             f'{", ".join(topics)}')
+        return topics[0]
+
+    def clouds(self, topic: str) -> Iterator[RecordedCloud]:
+        """Iterate over the clouds of a topic in the order of their recording.
+
+        Raises
+        ------
+        InputError
+            No such topic of clouds, or a bag that breaks off.
+        """
+        if topic not in self.cloud_topics():
+            raise InputError(f'topic {topic}: no clouds in {self.path}; there are '
+                             f'{", ".join(self.cloud_topics()) or "none"}')
+        chosen = [c for c in self._reader.connections
+                  if c.topic == topic and c.msgtype == CLOUD_TYPE]
+        with _readable(self.path):
+            for _, time_ns, raw in self._reader.messages(chosen):
+                yield RecordedCloud(time_ns, lambda raw=raw: self._read(raw))  # type: ignore[misc]
+
+    def _first_fields(self, topic: str) -> list[str]:
+        try:
+            return field_names(next(self.clouds(topic)).read()[2])
+        except (InputError, StopIteration):
+            return []
+
+    def _read(self, raw: bytes) -> tuple[int, str, Any]:
+        with _readable('a message of the bag'):
+            message: Any = self._reader.deserialize(raw, CLOUD_TYPE)
+            return stamp_ns_of(message.header), message.header.frame_id, message
+
+
+class BagWriter:
+    """Writes an mcap bag that Jazzy plays; use it in a ``with``.
+
+    Parameters
+    ----------
+    path : str or Path
+        Folder to create; it must not exist.
+
+    Raises
+    ------
+    InputError
+        The folder is there, or cannot be made.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        self._store = get_typestore(Stores.ROS2_JAZZY)
+        self._connections: dict[str, Connection] = {}
+        try:
+            self._writer = Writer(
+                Path(path), version=Writer.VERSION_LATEST, storage_plugin=StoragePlugin.MCAP)
+        except WriterError as error:
+            raise InputError(str(error)) from error
+
+    def __enter__(self) -> Self:
+        """Create the bag."""
+        self._writer.path.parent.mkdir(parents=True, exist_ok=True)
+        self._writer.open()
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
+                 trace: TracebackType | None) -> None:
+        """Finish the bag."""
+        self._writer.__exit__(kind, error, trace)
+
+    def types(self, name: str) -> Any:
+        """Return the message class of a name such as ``'nav_msgs/msg/Odometry'``."""
+        return self._store.types[name]
+
+    def write(self, topic: str, message: Any, time_ns: int) -> None:
+        """Add a message, built of `types`, as recorded at `time_ns`."""
+        kind = message.__msgtype__
+        if topic not in self._connections:
+            self._connections[topic] = self._writer.add_connection(
+                topic, kind, typestore=self._store)
+        self._writer.write(self._connections[topic], time_ns,
+                           self._store.serialize_cdr(message, kind))
+
+
+@contextmanager
+def _readable(what: Path | str) -> Iterator[None]:
+    """Turn what a parser of broken bytes raises, which can be anything, into one error."""
+    try:
+        yield
+    except InputError:
+        raise
+    except Exception as error:
+        raise InputError(f'{what}: cannot be read: '
+                         f'{str(error) or type(error).__name__}') from error

@@ -1,0 +1,28 @@
+"""What node and replay need to know of the clouds that they take and the poses they give."""
+from dataclasses import dataclass
+
+from ..core.settings import InputError
+from ..core.settings import setting
+from ..core.settings import Settings
+
+
+@dataclass(frozen=True)
+class StreamConfig(Settings):
+    """Field of the labels and names of the frames."""
+
+    label_field: str = setting(
+        'label', 'Field of the clouds that holds the class ids; empty: work without labels')
+    odom_frame: str = setting(
+        'odom', 'Frame of the published poses; its origin is the first scan')
+    sensor_frame: str = setting(
+        '', 'Frame of the sensor in what is published; empty: the frame_id of each scan')
+
+    def __post_init__(self) -> None:
+        """Check the frames too."""
+        super().__post_init__()
+        if not self.odom_frame:
+            raise InputError("odom_frame = '': a frame needs a name")
+        for name in ('odom_frame', 'sensor_frame'):
+            if getattr(self, name).startswith('/'):
+                raise InputError(f'{name} = {getattr(self, name)!r}: frame ids have no leading '
+                                 'slash')
