@@ -1,12 +1,22 @@
-"""Whether to trust a registration: confidence from evidence (beyond the paper)."""
+"""Whether to trust a registration: confidence from the evidence of the clouds (beyond the paper)."""
 from dataclasses import replace
 
 from .config import SgorConfig
-from .scan import PreparedScan
+from .evidence import evidence
+from .evidence import View
 from .scan import Registration
 
 
-def judge(result: Registration, source: PreparedScan, target: PreparedScan,
-          config: SgorConfig) -> Registration:
+def judge(result: Registration, source: View, target: View, config: SgorConfig) -> Registration:
     """Add confidence and evidence to a candidate; refuse it below `min_confidence`."""
-    return replace(result, confidence=1.0)
+    if result.T_target_source is None:
+        return result
+    found = evidence(source, target, result.T_target_source, config.evidence_reach)
+    result = replace(result, confidence=found.confidence,
+                     evidence={'agree': found.agree, 'contradict': found.contradict})
+    if not result.success or found.confidence >= config.min_confidence:
+        return result
+    return replace(result, success=False,
+                   reason=f'confidence {found.confidence:.2f} is below min_confidence '
+                          f'{config.min_confidence:.2f}: of the keypoints {found.agree:.0%} agree, '
+                          f'{found.contradict:.0%} contradict')

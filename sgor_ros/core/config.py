@@ -75,7 +75,7 @@ class SgorConfig(Settings):
 
     # semantic-geometric consistency (Sec. III-C)
     sigma_d: float = setting(
-        0.6, 'Two correspondences are consistent when their lengths differ by less', 'm',
+        0.4, 'Two correspondences are consistent when their lengths differ by less', 'm',
         minimum=0.005, maximum=5.0)
     weight_cutoff: float = setting(
         1.0, 'Multiple of sigma_d beyond which the weights W_m are zero', minimum=1.0, maximum=8.0)
@@ -84,6 +84,9 @@ class SgorConfig(Settings):
         'none: geometry only (ablation 5)', choices=('loose', 'hard', 'none'))
 
     # two-stage verification and refinement (Sec. III-D, III-E)
+    cloud_check: bool = setting(
+        True, 'Choose among hypotheses by the evidence of the clouds instead of the truncated '
+        'distance (beyond the paper)')
     ground_check: bool = setting(
         True, 'Refuse hypotheses that tilt the ground; false: ablation 8')
     sigma_theta: float = setting(
@@ -106,8 +109,11 @@ class SgorConfig(Settings):
         minimum=0.02, maximum=10.0)
     min_inliers: int = setting(
         10, 'Fewer inliers are a failure', minimum=3, maximum=10000)
+    evidence_reach: float = setting(
+        0.6, 'Keypoints with one of the same label nearer than this under the result agree', 'm',
+        minimum=0.01, maximum=10.0)
     min_confidence: float = setting(
-        0.5, 'Results below this confidence are failures; 0: accept all', minimum=0.0, maximum=1.0)
+        0.75, 'Results below this confidence are failures; 0: accept all', minimum=0.0, maximum=1.0)
 
     threads: int = setting(2, 'Processor cores to use', minimum=1, maximum=64)
 
@@ -133,13 +139,14 @@ class SgorConfig(Settings):
         return cls(min_range=0.0, max_range=20.0, voxel_size=0.05, sigma_g=0.03,
                    normal_radius=0.10, descriptor_radius=0.25, vote_radius=0.10, context_scale=0.15,
                    height_gate=0.0, key_spacing=0.1, sigma_d=0.10, tau_1=0.10,
-                   ground_check=False, local_voxel_size=0.03, local_reach=0.10)
+                   ground_check=False, local_voxel_size=0.03, local_reach=0.10,
+                   evidence_reach=0.10)
 
     @classmethod
     def paper(cls) -> Self:
         """Return the paper's steps and nothing besides."""
         return cls(robust_ground=False, match_within_labels=False, height_gate=0.0,
-                   context_weight=0.0,
+                   context_weight=0.0, cloud_check=False,
                    moving_vote=True, weight_cutoff=6.0, refinement_rounds=1, drop_ground_labels=False,
                    local_refinement=False,
                    min_confidence=0.0)

@@ -12,6 +12,7 @@ from .config import SgorConfig
 from .context import context_classes
 from .context import semantic_context
 from .correspondences import Features
+from .evidence import view
 from .features import fpfh
 from .features import normals
 from .features import regional_labels
@@ -76,12 +77,14 @@ def preprocess(scan: SemanticScan, config: SgorConfig | None = None, *,
             features = _over_ground(features, ground, convention, config)
         if ground.source == 'geometry':
             warnings.append('no ground labels: ground plane found by geometry')
+    with clock('view'):
+        sight = view(points, features, 2 * config.evidence_reach)
     with clock('surface'):
         fixed = (slice(None) if config.moving_vote
                  else ~np.isin(labels, list(convention.movable)))
         near_surface = (surface(points[fixed], config.local_voxel_size, config.threads)
                         if config.local_refinement else None)
-    return PreparedScan(scan, config, features, ground, near_surface, tuple(warnings),
+    return PreparedScan(scan, config, features, ground, sight, near_surface, tuple(warnings),
                         clock.seconds)
 
 

@@ -14,6 +14,7 @@ from .correspondences import Correspondences
 from .correspondences import given_correspondences
 from .correspondences import match
 from .correspondences import overlap_region
+from .evidence import View
 from .grouping import group
 from .hypotheses import hypothesise
 from .hypotheses import MIN_POINTS
@@ -58,7 +59,7 @@ def register(source: SemanticScan | PreparedScan, target: SemanticScan | Prepare
         correspondences = match(p, q, config)
     normals = (None if source.ground is None or target.ground is None
                else (source.ground.normal, target.ground.normal))
-    result = solve(correspondences, normals, config, clock)
+    result = solve(correspondences, normals, (source.view, target.view), config, clock)
     with clock('alignment'):
         if result.success and source.surface and target.surface:
             local = align(source.surface, target.surface, result.T_target_source, config)
@@ -66,7 +67,7 @@ def register(source: SemanticScan | PreparedScan, target: SemanticScan | Prepare
                              covariance=local.covariance,
                              inliers=inliers(local.T_target_source, correspondences, config.tau_1))
     with clock('acceptance'):
-        result = judge(result, source, target, config)
+        result = judge(result, source.view, target.view, config)
     return replace(result, source_ground=source.ground, target_ground=target.ground,
                    warnings=(*(f'source: {w}' for w in source.warnings),
                              *(f'target: {w}' for w in target.warnings)))
@@ -99,11 +100,11 @@ def register_correspondences(source_points: ArrayLike, target_points: ArrayLike,
     clock = Stopwatch()
     correspondences = given_correspondences(source_points, target_points, source_labels,
                                             target_labels, config)
-    return solve(correspondences, ground_normals, config, clock)
+    return solve(correspondences, ground_normals, None, config, clock)
 
 
-def solve(correspondences: Correspondences, ground_normals: Normals | None, config: SgorConfig,
-          clock: Stopwatch) -> Registration:
+def solve(correspondences: Correspondences, ground_normals: Normals | None,
+          views: tuple[View, View] | None, config: SgorConfig, clock: Stopwatch) -> Registration:
     """Remove outliers by semantic-geometric consistency and fit (Sec. III-B to III-E)."""
     found = Registration(False, '', None, correspondences.source, correspondences.target,
                          np.zeros(len(correspondences), np.bool_), timings=clock.seconds)
@@ -118,7 +119,7 @@ def solve(correspondences: Correspondences, ground_normals: Normals | None, conf
     with clock('hypotheses'):
         hypotheses = hypothesise(correspondences, groups, rows, config.group_keep)
     with clock('verification'):
-        verdict = verify(hypotheses, correspondences, ground_normals, config)
+        verdict = verify(hypotheses, correspondences, ground_normals, views, config)
     found = replace(found, hypotheses=hypotheses.T_target_source,
                     passed_ground_check=verdict.passed_ground_check, best_hypothesis=verdict.best)
     if verdict.best < 0:

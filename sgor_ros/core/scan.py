@@ -11,6 +11,7 @@ from .checks import as_labels
 from .checks import as_points
 from .config import SgorConfig
 from .correspondences import Features
+from .evidence import View
 from .ground import Ground
 from .settings import InputError
 
@@ -63,6 +64,8 @@ class PreparedScan:
         Keypoints with labels, descriptors and heights.
     ground : Ground or None
         None where no ground plane was found.
+    view : View
+        What it can say about transformations.
     surface : Surface or None
         Cloud for the local refinement; None where that is off or there are too few points.
     warnings : tuple of str
@@ -75,6 +78,7 @@ class PreparedScan:
     config: SgorConfig
     features: Features
     ground: Ground | None
+    view: View
     surface: Surface | None
     warnings: tuple[str, ...]
     timings: dict[str, float]

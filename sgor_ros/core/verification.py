@@ -7,6 +7,8 @@ from numpy.typing import NDArray
 
 from .config import SgorConfig
 from .correspondences import Correspondences
+from .evidence import rank
+from .evidence import View
 from .hypotheses import Hypotheses
 
 
@@ -40,8 +42,11 @@ class Verdict:
 
 
 def verify(hypotheses: Hypotheses, correspondences: Correspondences, ground_normals: Normals | None,
-           config: SgorConfig) -> Verdict:
-    """Drop hypotheses that tilt the ground, then take the nearest fit of the filtered matches."""
+           views: tuple[View, View] | None, config: SgorConfig) -> Verdict:
+    """Drop hypotheses that tilt the ground, then take the nearest fit of the filtered matches.
+
+    With the views of source and target and `cloud_check`, the clouds choose instead of the fit.
+    """
     T = hypotheses.T_target_source
     passed = np.ones(len(T), np.bool_)
     if config.ground_check and ground_normals is not None:
@@ -52,6 +57,9 @@ def verify(hypotheses: Hypotheses, correspondences: Correspondences, ground_norm
     union = np.unique(hypotheses.kept[hypotheses.kept >= 0])
     cost[passed] = truncated_distance(
         T[passed], correspondences.source[union], correspondences.target[union], config.sigma_d)
+    if config.cloud_check and views is not None:
+        rows = np.flatnonzero(passed)
+        return Verdict(passed, cost, int(rows[np.argmax(rank(*views, T[rows]))]))
     return Verdict(passed, cost, int(np.argmin(cost)))
 
 
