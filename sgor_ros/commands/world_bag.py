@@ -1,0 +1,74 @@
+"""The built-in world as a labelled bag with ground truth."""
+from dataclasses import dataclass
+from pathlib import Path
+import shutil
+
+import numpy as np
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from ..core import se3
+from ..core.settings import InputError
+from ..io.bags import BagWriter
+from ..io.messages import odometry_of
+from ..io.messages import point_cloud2
+
+Array = NDArray[np.float64]
+
+SPEED_M_S = 8.0
+# zero stands for "no stamp" in ROS
+FIRST_STAMP_NS = 1_000_000_000
+# of the points of every so many scans, every so many are the map
+MAP_SCANS, MAP_POINTS = 4, 3
+
+
+@dataclass(frozen=True, eq=False)
+class WorldMap:
+    """Some points of the world, for a picture.
+
+    Attributes
+    ----------
+    points : (P, 3) float64
+        In the world, metres.
+    labels : (P,) uint32
+        Raw SemanticKITTI ids.
+    """
+
+    points: Array
+    labels: NDArray[np.uint32]
+
+
+def write_world_bag(path: Path, scans: int, seed: int) -> tuple[dict[int, Array], WorldMap]:
+    """Drive through the built-in world at 10 Hz and record it, replacing an older bag.
+
+    The clouds are on `points`, the true poses on `ground_truth`.
+
+    Returns
+    -------
+    truth : dict of int to (4, 4) float64
+        Stamp in nanoseconds to T_world_sensor.
+    world : WorldMap
+    """
+    try:
+        from ..world import simulate
+    except ImportError as error:
+        raise InputError(f"the built-in world needs Open3D ({error}): pip install "
+                         "'sgor_ros[open3d]'") from error
+    print(f'building the world and a bag of {scans} scans: {path}', flush=True)
+    shutil.rmtree(path, ignore_errors=True)
+    truth: dict[int, Array] = {}
+    points_seen, labels_seen = [], []
+    drive = simulate(scans, seed, speed=SPEED_M_S)
+    with BagWriter(path) as bag:
+        for seconds, points, labels, pose in tqdm(drive, 'recording', scans, unit='scan',
+                                                  disable=None):
+            stamp_ns = FIRST_STAMP_NS + round(seconds * 1e9)
+            bag.write('points', point_cloud2(bag.types, points, labels, stamp_ns, 'lidar'),
+                      stamp_ns)
+            bag.write('ground_truth', odometry_of(bag.types, pose, stamp_ns, 'world', 'lidar'),
+                      stamp_ns)
+            if len(truth) % MAP_SCANS == 0:
+                points_seen.append(se3.transform(pose, points[::MAP_POINTS].astype(np.float64)))
+                labels_seen.append(labels[::MAP_POINTS])
+            truth[stamp_ns] = pose
+    return truth, WorldMap(np.concatenate(points_seen), np.concatenate(labels_seen))
