@@ -109,10 +109,14 @@ def _as_dict(result: Registration, arguments: Namespace) -> dict[str, Any]:
 
 def _plot(arguments: Namespace, source: SemanticScan, target: SemanticScan,
           result: Registration) -> None:
-    title = (f'{arguments.source.name} to {arguments.target.name}: '
+    title = (f'{_short(arguments.source)} to {_short(arguments.target)}: '
              f'{"registered" if result.success else "not registered"}, '
              f'confidence {result.confidence:.2f}')
     plot_registration(arguments.plot, title, source, target, result)
+
+
+def _short(path: Path) -> str:
+    return '/'.join(path.resolve().parts[-3:])
 
 
 if __name__ == '__main__':

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core import se3
+from ..core.ground import Ground
 from ..core.scan import Registration
 from ..core.scan import SemanticScan
 from ..core.settings import InputError
@@ -17,6 +18,9 @@ BLUE, ORANGE, GREEN, RED, GREY = '#2f6db3', '#e08a1e', '#2a9d5c', '#d1495b', '#8
 # what the eye still tells apart in a picture of this size
 SHOWN_POINTS = 40000
 SHOWN_REJECTED = 250
+SHOWN_INLIERS = 400
+# about as high as a kerb: only for the picture
+GROUND_BAND_M = 0.3
 # this share of the points is inside the picture of a scan
 SHOWN_SHARE = 0.97
 
@@ -41,8 +45,9 @@ def plot_track(path: str | Path, title: str, stamps_s: Sequence[float],
         0 to 1; nan where nothing was registered.
     """
     figure = _figure((13, 6.2))
-    ground, upper, lower = (figure.add_subplot(where) for where in (
-        _grid(figure)[:, 0], _grid(figure)[0, 1], _grid(figure)[1, 1]))
+    grid = figure.add_gridspec(2, 2, width_ratios=(1.15, 1))
+    ground, upper = figure.add_subplot(grid[:, 0]), figure.add_subplot(grid[0, 1])
+    lower = figure.add_subplot(grid[1, 1], sharex=upper)
     figure.suptitle(title, x=0.02, ha='left', weight='bold')
     _draw_track(ground, poses)
     time_s = np.asarray(stamps_s) - stamps_s[0]
@@ -70,22 +75,24 @@ def plot_registration(path: str | Path, title: str, source: SemanticScan, target
     result : Registration
         Of `source` to `target`; without a transformation the clouds are drawn as they came.
     """
-    figure = _figure((13, 6.8))
+    figure = _figure((13, 6.8), 'compressed')
     left, right = figure.subplots(1, 2, sharex=True, sharey=True)
     figure.suptitle(title, x=0.02, ha='left', weight='bold')
     T = np.eye(4) if result.T_target_source is None else result.T_target_source
     moved = se3.transform(T, source.points.astype(np.float64))
-    _draw_cloud(left, source.points, ORANGE, 'source')
-    _draw_cloud(left, target.points, BLUE, 'target')
+    low = [_on_ground(scan.points, plane)
+           for scan, plane in ((source, result.source_ground), (target, result.target_ground))]
+    for axes, points in ((left, source.points), (right, moved)):
+        _draw_cloud(axes, target.points, low[1], BLUE, 'target')
+        _draw_cloud(axes, points, low[0], ORANGE, 'source')
     _draw_matches(left, result.source_points, result.target_points, result.inliers)
-    _draw_cloud(right, target.points, BLUE, 'target')
-    _draw_cloud(right, moved, ORANGE, 'source')
     for label, pose, colour in (('target', np.eye(4), BLUE), ('source', T, ORANGE)):
         right.plot(*pose[:2, 3], 'o', ms=8, mfc=colour, mec='white', mew=1.5, zorder=5,
                    label=f'{label} sensor')
     left.set_title(f'as they came; {int(result.inliers.sum())} inliers (green) of '
                    f'{len(result.inliers)} matches')
-    right.set_title('aligned' if result.success else f'not registered: {result.reason}')
+    right.set_title('aligned' if result.success else f'not registered: {result.reason}; '
+                    f'{"as they came" if result.T_target_source is None else "best candidate"}')
     _frame_clouds((left, right), np.vstack((source.points, target.points, moved))[:, :2])
     for axes in (left, right):
         axes.set(aspect='equal', xlabel='x [m]', ylabel='y [m]')
@@ -93,19 +100,15 @@ def plot_registration(path: str | Path, title: str, source: SemanticScan, target
     _save(figure, path)
 
 
-def _figure(size: tuple[float, float]) -> Any:
+def _figure(size: tuple[float, float], layout: str = 'constrained') -> Any:
     try:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
     except ImportError as error:
         raise InputError(f'pictures need matplotlib: {error}') from error
-    figure = Figure(figsize=size, layout='constrained')
+    figure = Figure(figsize=size, layout=layout)
     FigureCanvasAgg(figure)
     return figure
-
-
-def _grid(figure: Any) -> Any:
-    return figure.add_gridspec(2, 2, width_ratios=(1.15, 1))
 
 
 def _save(figure: Any, path: str | Path) -> None:
@@ -114,7 +117,7 @@ def _save(figure: Any, path: str | Path) -> None:
         axes.set_axisbelow(True)
         axes.spines[['top', 'right']].set_visible(False)
         axes.title.set_fontsize(10)
-    figure.savefig(path, dpi=130)
+    figure.savefig(path, dpi=130, bbox_inches='tight', pad_inches=0.15)
 
 
 def _draw_track(axes: Any, poses: Sequence[Array | None]) -> None:
@@ -147,27 +150,37 @@ def _draw_times(axes: Any, time_s: Array, milliseconds: Array) -> None:
     top = float(taken.max())
     if 0 < period < 3 * top:
         axes.axhline(period, color=ORANGE, lw=1.2, ls='--')
-        axes.annotate(f'{period:.0f} ms between scans', (time_s[0], period), color=ORANGE,
-                      va='bottom', xytext=(2, 2), textcoords='offset points')
+        axes.annotate(f'{period:.0f} ms between scans', (time_s[-1], period), color=ORANGE,
+                      ha='right', va='bottom', xytext=(0, 2), textcoords='offset points')
         top = max(top, period)
     axes.set(ylim=(0, 1.15 * top), ylabel='time [ms]',
              title=f'time per scan: median {np.median(taken):.0f} ms, '
                    f'p95 {np.percentile(taken, 95):.0f} ms')
 
 
-def _draw_cloud(axes: Any, points: NDArray[Any], colour: str, label: str) -> None:
-    shown = points[::max(1, len(points) // SHOWN_POINTS)]
-    axes.plot(shown[:, 0], shown[:, 1], ',', color=colour, alpha=0.6, rasterized=True)
+def _on_ground(points: NDArray[Any], ground: Ground | None) -> NDArray[np.bool_]:
+    if ground is None:
+        return np.zeros(len(points), np.bool_)
+    return np.abs(ground.heights(points)) < GROUND_BAND_M
+
+
+def _draw_cloud(axes: Any, points: NDArray[Any], low: NDArray[np.bool_], colour: str, label: str
+                ) -> None:
+    """Draw what stands stronger than what lies: the ground looks the same everywhere."""
+    for part, alpha, size in ((points[low], 0.25, 0.3), (points[~low], 0.7, 0.8)):
+        shown = part[::max(1, len(part) // SHOWN_POINTS)]
+        axes.scatter(shown[:, 0], shown[:, 1], s=size, color=colour, alpha=alpha, linewidths=0,
+                     rasterized=True)
     axes.plot([], [], 's', color=colour, ms=7, label=label)
 
 
 def _draw_matches(axes: Any, source: Array, target: Array, inliers: NDArray[np.bool_]) -> None:
     from matplotlib.collections import LineCollection
     ends = np.stack((source[:, :2], target[:, :2]), axis=1)
-    rejected = ends[~inliers][::max(1, int((~inliers).sum()) // SHOWN_REJECTED)]
-    axes.add_collection(LineCollection(list(rejected), colors=RED, linewidths=0.5, alpha=0.25))
-    axes.add_collection(LineCollection(list(ends[inliers]), colors=GREEN, linewidths=0.9,
-                                       alpha=0.8, zorder=3))
+    for part, limit, colour, width, alpha in ((ends[~inliers], SHOWN_REJECTED, RED, 0.5, 0.3),
+                                              (ends[inliers], SHOWN_INLIERS, GREEN, 0.9, 0.8)):
+        axes.add_collection(LineCollection(list(part[::max(1, len(part) // limit)]),
+                                           colors=colour, linewidths=width, alpha=alpha))
 
 
 def _frame_clouds(panels: Sequence[Any], xy: NDArray[Any]) -> None:

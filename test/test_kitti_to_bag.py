@@ -1,0 +1,123 @@
+"""A sequence on disk and the bag that comes of it hold the same scans, times and poses."""
+import numpy as np
+import pytest
+from rosbags.highlevel import AnyReader
+
+from sgor_ros.commands.kitti_to_bag import main
+from sgor_ros.io.bags import BagReader
+from sgor_ros.io.pointcloud2 import decode
+
+NUMBERS = (3, 4, 6)
+
+
+def rigid(rng):
+    q, _ = np.linalg.qr(rng.normal(size=(3, 3)))
+    T = np.eye(4)
+    T[:3, :3], T[:3, 3] = q * np.sign(np.linalg.det(q)), rng.normal(0, 5, 3)
+    return T
+
+
+@pytest.fixture
+def sequence(tmp_path):
+    """Return a part of a sequence: scans 3, 4 and 6, times and poses of 0 to 9."""
+    rng = np.random.default_rng(0)
+    folder = tmp_path / '08'
+    (folder / 'velodyne').mkdir(parents=True)
+    for name in ('labels', 'predicted_labels'):
+        (folder / name).mkdir()
+    for number in NUMBERS:
+        count = 100 + number
+        rng.normal(0, 9, (count, 4)).astype(np.float32).tofile(
+            folder / f'velodyne/{number:06d}.bin')
+        np.full(count, number, np.uint32).tofile(folder / f'labels/{number:06d}.label')
+        np.full(count, 50 + number, np.uint32).tofile(
+            folder / f'predicted_labels/{number:06d}.label')
+    (folder / 'times.txt').write_text(''.join(f'{i * 0.1039:.6e}\n' for i in range(10)))
+    return folder
+
+
+def clouds(path):
+    with BagReader(path) as bag:
+        return [(stamp_ns, frame, decode(message, 'label')) for stamp_ns, frame, message
+                in (cloud.read() for cloud in bag.clouds('/points'))]
+
+
+def test_clouds_labels_and_times(sequence, tmp_path, capsys):
+    assert main([str(sequence), str(tmp_path / 'bag')]) == 0
+    assert '3 clouds on /points, no poses' in capsys.readouterr().out
+    result = clouds(tmp_path / 'bag')
+    assert [stamp for stamp, _, _ in result] == [311_700_000, 415_600_000, 623_400_000]
+    for number, (_, frame, scan) in zip(NUMBERS, result, strict=True):
+        expected = np.fromfile(sequence / f'velodyne/{number:06d}.bin', np.float32)
+        np.testing.assert_array_equal(scan.points, expected.reshape(-1, 4)[:, :3])
+        assert set(scan.labels) == {number}
+        assert frame == 'lidar'
+
+
+def test_predicted_labels(sequence, tmp_path):
+    assert main([str(sequence), str(tmp_path / 'bag'), '--labels', 'predicted_labels']) == 0
+    assert [set(scan.labels) for *_, scan in clouds(tmp_path / 'bag')] == [{53}, {54}, {56}]
+
+
+def test_ground_truth_is_of_the_lidar_and_begins_with_the_first_scan(sequence, tmp_path):
+    rng = np.random.default_rng(1)
+    T_camera_lidar = rigid(rng)
+    T_world_lidar = [rigid(rng) for _ in range(10)]
+    cameras = [T_camera_lidar @ T @ np.linalg.inv(T_camera_lidar) for T in T_world_lidar]
+    np.savetxt(sequence / 'poses.txt', [T[:3].reshape(-1) for T in cameras])
+    numbers = ' '.join(f'{v:.12e}' for v in T_camera_lidar[:3].reshape(-1))
+    (sequence / 'calib.txt').write_text(f'P0: 1 2 3\n\nTr: {numbers}\n')
+    assert main([str(sequence), str(tmp_path / 'bag')]) == 0
+    with AnyReader([tmp_path / 'bag']) as bag:
+        truth = [bag.deserialize(raw, c.msgtype) for c, _, raw in bag.messages()
+                 if c.topic == '/ground_truth']
+    assert len(truth) == len(NUMBERS)
+    for number, message in zip(NUMBERS, truth, strict=True):
+        expected = np.linalg.inv(T_world_lidar[3]) @ T_world_lidar[number]
+        p = message.pose.pose.position
+        np.testing.assert_allclose([p.x, p.y, p.z], expected[:3, 3], atol=1e-6)
+        assert message.child_frame_id == 'lidar'
+
+
+def broken(sequence, what):
+    """Break one thing and return what the message must say."""
+    if what == 'no folder':
+        (sequence / 'velodyne').rename(sequence / 'elsewhere')
+        return 'velodyne: no such folder'
+    if what == 'no scans':
+        for path in (sequence / 'velodyne').iterdir():
+            path.unlink()
+        return 'no .bin files'
+    if what == 'labels missing':
+        (sequence / 'labels/000004.label').unlink()
+        return 'no labels for 1 of 3 scans, the first is 000004.label'
+    if what == 'labels short':
+        (sequence / 'labels/000004.label').write_bytes(b'1234')
+        return '4 bytes are neither'
+    if what == 'scan truncated':
+        (sequence / 'velodyne/000006.bin').write_bytes(b'12345')
+        return '5 bytes are no points'
+    if what == 'times short':
+        (sequence / 'times.txt').write_text('0\n1\n2\n')
+        return 'times.txt: 3 rows, but the scans go up to number 6'
+    if what == 'times missing':
+        (sequence / 'times.txt').unlink()
+        return 'times.txt: no times'
+    np.savetxt(sequence / 'poses.txt', np.tile(np.eye(4)[:3].reshape(-1), (10, 1)))
+    return 'calib.txt: no row Tr'
+
+
+@pytest.mark.parametrize('what', [
+    'no folder', 'no scans', 'labels missing', 'labels short', 'scan truncated', 'times short',
+    'times missing', 'no calibration'])
+def test_broken_sequences(sequence, tmp_path, capsys, what):
+    says = broken(sequence, what)
+    assert main([str(sequence), str(tmp_path / 'bag')]) == 2
+    message = capsys.readouterr().err
+    assert message.startswith('error: ')
+    assert says in message
+
+
+def test_an_existing_bag_is_not_overwritten(sequence, tmp_path, capsys):
+    assert main([str(sequence), str(tmp_path)]) == 2
+    assert 'exists already' in capsys.readouterr().err
