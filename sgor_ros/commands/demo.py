@@ -63,7 +63,10 @@ def _run(options: argparse.Namespace) -> int:
         raise InputError(f'no ROS 2 here ({error}): source /opt/ros/jazzy/setup.bash, or '
                          "pip install 'sgor_ros[ros]'") from error
     out: Path = options.out
-    out.mkdir(parents=True, exist_ok=True)
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f'--out {out}: {error.strerror}') from error
     bag = out / 'bag'
     truth, world = write_world_bag(bag, options.scans, options.seed)
     isolate()

@@ -39,12 +39,15 @@ START_TIMEOUT_S = 240.0
 LAST_ANSWER_S = 15.0
 STOP_TIMEOUT_S = 20.0
 POLL_S = 0.05
+# discovery is told to both sides, but not at the same moment
+SETTLING_S = 0.5
 
 
 def isolate() -> None:
     """Keep what follows, in this process and its children, off the user's own ROS graph."""
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
-    os.environ['ROS_DOMAIN_ID'] = str(1 + os.getpid() % 100)
+    # 215 to 232 are free of Linux's ephemeral ports and hardly ever chosen by hand
+    os.environ['ROS_DOMAIN_ID'] = str(215 + os.getpid() % 18)
 
 
 class NodeProcess:
@@ -128,7 +131,7 @@ class Player:
 
     def __init__(self) -> None:
         rclpy.init()
-        node = Node('sgor_player')
+        self._node = node = Node('sgor_player')
         self._store = get_typestore(Stores.ROS2_JAZZY)
         self._points = node.create_publisher(
             PointCloud2, 'points', QoSProfile(depth=5, reliability=ReliabilityPolicy.RELIABLE))
@@ -153,8 +156,11 @@ class Player:
         rclpy.try_shutdown()
 
     def wait_for_node(self, alive: Callable[[], bool]) -> bool:
-        """Return True once somebody listens to the clouds, False when that will not be."""
-        return _wait(lambda: self._points.get_subscription_count() > 0, START_TIMEOUT_S, alive)
+        """Return True once the node listens to the clouds, False when that will not be."""
+        ready = _wait(lambda: self._points.get_subscription_count() > 0
+                      and self._node.count_publishers('odometry') > 0, START_TIMEOUT_S, alive)
+        time.sleep(SETTLING_S)
+        return ready
 
     def play(self, clouds: Iterable[tuple[int, Any]], period_s: float,
              alive: Callable[[], bool]) -> Heard:

@@ -1,0 +1,67 @@
+"""The demo as `make demo` runs it, short."""
+import re
+import struct
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from sgor_ros.core import se3
+from sgor_ros.evaluation.track import track_errors
+
+
+def run_demo(*arguments):
+    return subprocess.run([sys.executable, '-m', 'sgor_ros.commands.demo', *map(str, arguments)],
+                          capture_output=True, text=True, timeout=400)
+
+
+def test_demo_plays_the_world_and_agrees_with_the_truth(tmp_path):
+    # slow enough that no scan is replaced on a busy machine either
+    done = run_demo('--scans', 8, '--rate', 0.5, '--out', tmp_path / 'demo')
+    assert done.returncode == 0, done.stdout + done.stderr
+    table = dict(re.split(r' {2,}', line.strip(), maxsplit=1)
+                 for line in done.stdout.splitlines() if '  ' in line.strip())
+    assert table['scans sent'] == '8'
+    assert table['processed'] == '8'
+    assert table['replaced by a newer one'] == '0'
+    te_cm = float(re.search(r'median ([\d.]+) cm', table['TE of consecutive pairs']).group(1))
+    assert te_cm < 5
+    assert float(re.match(r'([\d.]+) m', table['end of the track, after 6 m']).group(1)) < 0.2
+    for name in ('trajectory.png', 'errors.png'):
+        width, height = struct.unpack('>II', (tmp_path / 'demo' / name).read_bytes()[16:24])
+        assert min(width, height) > 400
+    assert 'received 8, processed 8' in (tmp_path / 'demo/node.log').read_text()
+
+
+@pytest.mark.parametrize(('arguments', 'message'), [
+    (['--scans', '1'], '--scans 1: at least 2'),
+    (['--rate', '0'], '--rate 0.0: 0.1 to 100')])
+def test_demo_refuses_what_makes_no_sense(arguments, message, tmp_path):
+    done = run_demo(*arguments, '--out', tmp_path)
+    assert done.returncode == 2
+    assert message in done.stderr
+    assert 'Traceback' not in done.stderr
+
+
+def test_demo_says_that_its_folder_cannot_be_used(tmp_path):
+    (tmp_path / 'file').write_text('')
+    done = run_demo('--out', tmp_path / 'file/demo')
+    assert done.returncode == 2
+    assert str(tmp_path / 'file/demo') in done.stderr
+    assert 'Traceback' not in done.stderr
+
+
+def test_track_is_laid_on_the_truth_at_its_first_pose():
+    turn = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
+    start = se3.compose(turn, np.array([5.0, 6, 7]))
+    steps = np.array([se3.compose(np.eye(3), np.array([x, 0, 0])) for x in (0.0, 4, 10)])
+    wrong = steps.copy()
+    wrong[2, 1, 3] = 0.3
+    errors = track_errors(wrong, start @ steps, (10.0,))
+    assert errors.length_m == pytest.approx(10)
+    assert errors.translation_m == pytest.approx([0, 0.3])
+    assert errors.end_translation_m == pytest.approx(0.3)
+    assert errors.drift.translation_percent == pytest.approx(3.0)
+    # 0.3 m to the left of a start that looks along y
+    assert errors.estimate[2, :3, 3] == pytest.approx([4.7, 16, 7])
