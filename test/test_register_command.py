@@ -6,6 +6,7 @@ from conftest import relative
 import numpy as np
 import pytest
 
+from sgor_ros import SgorConfig
 from sgor_ros.commands.register import main
 
 
@@ -106,7 +107,7 @@ def test_help_tells_units_bounds_and_defaults(capsys):
         main(['--help'])
     said = ' '.join(capsys.readouterr().out.split())
     assert ('--sigma-d m Two correspondences are consistent when their lengths differ by less '
-            '[m]; at least 0.005, at most 5, default 0.6') in said
+            f'[m]; at least 0.005, at most 5, default {SgorConfig().sigma_d:g}') in said
     assert '--no-local-refinement' in said
 
 

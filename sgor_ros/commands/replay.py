@@ -75,20 +75,30 @@ def replay(arguments: Namespace) -> int:
     output: Path = arguments.output or Path('out') / arguments.bag_path.stem
     warnings = Warnings()
     rows: list[Row] = []
+    broken: InputError | None = None
     with ExitStack() as stack:
         bag = stack.enter_context(BagReader(arguments.bag_path))
         topic = arguments.topic or bag.find_topic(stream.label_field)
-        clouds = bag.clouds(topic)
+        clouds, expected = bag.clouds(topic), bag.cloud_topics()[topic]
         output.mkdir(parents=True, exist_ok=True)
         writer = stack.enter_context(BagWriter(output / 'bag')) if arguments.bag else None
         warm_up(tracker.config)
-        for cloud in tqdm(clouds, total=bag.cloud_topics().get(topic), unit='scan', disable=None):
-            rows.append(_step(tracker, cloud, stream, writer, warnings))
+        try:
+            for cloud in tqdm(clouds, total=expected, unit='scan', disable=None):
+                rows.append(_step(tracker, cloud, stream, writer, warnings))
+        except InputError as error:
+            broken = error    # what came before is worth keeping
+    if broken and not rows:
+        raise broken
+    if len(rows) < expected:
+        warnings.add(f'{topic}: the bag tells of {expected} clouds, only {len(rows)} came')
     if all(row.T_odom_sensor is None for row in rows):
         raise InputError(f'{topic}: none of {len(rows)} clouds could be used: {rows[0].reason}')
     summary = _summary(rows, warnings.texts, arguments.bag_path, topic, tracker, stream)
     _write(output, rows, summary, f'{arguments.bag_path.name} {topic}')
     _print(summary, output)
+    if broken:
+        raise InputError(f'after {len(rows)} scans: {broken}')
     return 0
 
 

@@ -3,6 +3,7 @@ from collections.abc import Callable
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -112,11 +113,13 @@ class BagReader:
         if topic not in self.cloud_topics():
             raise InputError(f'topic {topic}: no clouds in {self.path}; there are '
                              f'{", ".join(self.cloud_topics()) or "none"}')
-        chosen = [c for c in self._reader.connections
-                  if c.topic == topic and c.msgtype == CLOUD_TYPE]
+        return self._iterate([c for c in self._reader.connections
+                              if c.topic == topic and c.msgtype == CLOUD_TYPE])
+
+    def _iterate(self, connections: list[Connection]) -> Iterator[RecordedCloud]:
         with _readable(self.path):
-            for _, time_ns, raw in self._reader.messages(chosen):
-                yield RecordedCloud(time_ns, lambda raw=raw: self._read(raw))  # type: ignore[misc]
+            for _, time_ns, raw in self._reader.messages(connections):
+                yield RecordedCloud(time_ns, partial(self._read, raw))
 
     def _first_fields(self, topic: str) -> list[str]:
         try:

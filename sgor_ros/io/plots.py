@@ -2,6 +2,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -100,7 +101,8 @@ def plot_registration(path: str | Path, title: str, source: SemanticScan, target
     _save(figure, path)
 
 
-def _figure(size: tuple[float, float], layout: str = 'constrained') -> Any:
+def _figure(size: tuple[float, float],
+            layout: Literal['constrained', 'compressed'] = 'constrained') -> Any:
     try:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure

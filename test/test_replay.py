@@ -1,0 +1,317 @@
+"""`sgor_replay` over bags good and bad: the same poses as the tracker, and never a traceback."""
+import json
+import re
+import shutil
+
+from conftest import errors
+from conftest import PERIOD_NS
+from conftest import relative
+from conftest import write_bag
+import numpy as np
+import pytest
+from rosbags.highlevel import AnyReader
+from rosbags.rosbag1 import Writer as Writer1
+from rosbags.rosbag2 import StoragePlugin
+from rosbags.rosbag2 import Writer as Writer2
+from rosbags.typesys import get_typestore
+from rosbags.typesys import Stores
+from scipy.spatial.transform import Rotation
+
+from sgor_ros import SemanticScan
+from sgor_ros import SgorConfig
+from sgor_ros import Tracker
+from sgor_ros.commands.kitti_to_bag import main as kitti_to_bag
+from sgor_ros.commands.replay import main
+from sgor_ros.io.bags import BagReader
+from sgor_ros.io.bags import BagWriter
+from sgor_ros.io.messages import header
+from sgor_ros.io.messages import point_cloud2
+from sgor_ros.io.messages import stamp_ns_of
+from sgor_ros.io.trajectories import read_kitti
+
+CLOUD = 'sensor_msgs/msg/PointCloud2'
+
+
+@pytest.fixture(scope='module')
+def replayed(street_bag, tmp_path_factory):
+    """Return the output folder of a replay of the street with a bag of results."""
+    output = tmp_path_factory.mktemp('out') / 'deep/er'
+    assert main([str(street_bag), '--output', str(output), '--bag']) == 0
+    return output
+
+
+def summary(folder):
+    return json.loads((folder / 'summary.json').read_text())
+
+
+def test_poses_are_those_of_the_tracker(street, replayed):
+    tracker = Tracker()
+    expected = [tracker.track(SemanticScan(points, labels), i * PERIOD_NS).T_odom_sensor
+                for i, (points, labels, _) in enumerate(street)]
+    np.testing.assert_allclose(read_kitti(replayed / 'trajectory_kitti.txt'), expected, atol=1e-8)
+
+
+def test_poses_are_right(street, replayed):
+    poses = read_kitti(replayed / 'trajectory_kitti.txt')
+    for T, (*_, T_world_sensor) in zip(poses, street, strict=True):
+        metres, degrees = errors(T, relative(street[0][2], T_world_sensor))
+        assert metres < 0.15
+        assert degrees < 0.3
+
+
+def test_tum_has_stamps_and_quaternions(replayed):
+    rows = np.loadtxt(replayed / 'trajectory.tum')
+    poses = read_kitti(replayed / 'trajectory_kitti.txt')
+    np.testing.assert_allclose(rows[:, 0], [0.0, 0.1, 0.2, 0.3])
+    np.testing.assert_allclose(rows[:, 1:4], poses[:, :3, 3], atol=1e-8)
+    x, y, z, w = rows[-1, 4:]
+    assert 2 * (x * y + z * w) == pytest.approx(poses[-1, 1, 0], abs=1e-8)
+
+
+def test_summary_and_picture(replayed):
+    result = summary(replayed)
+    assert (result['scans'], result['successes'], result['failures']) == (4, 4, [])
+    assert result['topic'] == '/points'
+    assert result['restarts'] == [0]
+    assert result['parameters']['sigma_d'] == SgorConfig().sigma_d
+    assert result['parameters']['mode'] == 'consecutive'
+    assert result['environment']['numpy'] == np.__version__
+    timings = result['timings_ms']
+    assert {'total', 'preprocessing', 'matching', 'consistency'} <= timings.keys()
+    assert 0 < timings['total']['median'] <= timings['total']['p95']
+    assert (replayed / 'trajectory.png').read_bytes().startswith(b'\x89PNG')
+
+
+def test_results_in_a_bag(replayed):
+    poses = read_kitti(replayed / 'trajectory_kitti.txt')
+    with AnyReader([replayed / 'bag']) as bag:
+        found = {topic: [] for topic in bag.topics}
+        for connection, time_ns, raw in bag.messages():
+            found[connection.topic].append((time_ns, bag.deserialize(raw, connection.msgtype)))
+    assert found.keys() == {'/odometry', '/pose', '/correspondences'}
+    for i, (time_ns, message) in enumerate(found['/odometry']):
+        assert time_ns == stamp_ns_of(message.header) == i * PERIOD_NS
+        assert (message.header.frame_id, message.child_frame_id) == ('odom', 'lidar')
+        p = message.pose.pose.position
+        np.testing.assert_allclose([p.x, p.y, p.z], poses[i, :3, 3], atol=1e-8)
+    assert [len(m.markers[0].points) > 20 for _, m in found['/correspondences']] == [
+        False, True, True, True]    # the first scan has nothing to compare with
+
+
+def test_existing_results_in_a_bag_are_kept(street_bag, replayed, capsys):
+    assert main([str(street_bag), '--output', str(replayed), '--bag']) == 2
+    assert 'exists already' in capsys.readouterr().err
+
+
+def test_keyframes_by_option_and_by_file(street_bag, tmp_path):
+    params = tmp_path / 'p.yaml'
+    params.write_text('/**:\n  ros__parameters:\n    mode: keyframe\n    sigma_d: 0.5\n')
+    assert main([str(street_bag), '--output', str(tmp_path), '--params-file', str(params),
+                 '--sigma-d', '0.7', '--odom-frame', 'map']) == 0
+    parameters = summary(tmp_path)['parameters']
+    assert (parameters['mode'], parameters['sigma_d'], parameters['odom_frame']) == (
+        'keyframe', 0.7, 'map')
+
+
+def cdr(message):
+    store = get_typestore(Stores.ROS2_JAZZY)
+    return bytes(store.serialize_cdr(message, message.__msgtype__))
+
+
+def write_raw(path, messages, topic='/points'):
+    store = get_typestore(Stores.ROS2_JAZZY)
+    with Writer2(path, version=9, storage_plugin=StoragePlugin.SQLITE3) as bag:
+        connection = bag.add_connection(topic, CLOUD, typestore=store)
+        for time_ns, raw in messages:
+            bag.write(connection, time_ns, raw)
+    return path
+
+
+def cloud_of(street, i, stamp_ns):
+    types = get_typestore(Stores.ROS2_JAZZY).types.__getitem__
+    return point_cloud2(types, *street[i][:2], stamp_ns, 'lidar')
+
+
+def test_broken_clouds_are_left_out(street, tmp_path, capsys):
+    short = cloud_of(street, 1, PERIOD_NS)
+    short.data = short.data[:1000]
+    empty = cloud_of(street, 1, 2 * PERIOD_NS)
+    empty.width, empty.row_step, empty.data = 0, 0, empty.data[:0]
+    nan = point_cloud2(get_typestore(Stores.ROS2_JAZZY).types.__getitem__,
+                       np.full((5, 3), np.nan), np.zeros(5, int), 3 * PERIOD_NS, 'lidar')
+    bag = write_raw(tmp_path / 'bag', [
+        (0, cdr(cloud_of(street, 0, 0))), (1, cdr(short)), (2, cdr(empty)), (3, cdr(nan)),
+        (4 * PERIOD_NS, cdr(cloud_of(street, 1, 4 * PERIOD_NS))[:300]),
+        (5 * PERIOD_NS, cdr(cloud_of(street, 1, 5 * PERIOD_NS)))])
+    assert main([str(bag), '--output', str(tmp_path)]) == 0
+    result = summary(tmp_path)
+    assert [failure['scan'] for failure in result['failures']] == [1, 2, 3, 4]
+    said = capsys.readouterr().err
+    for text in ('data: 1000 bytes', 'the cloud is empty', 'none of 5 is finite',
+                 'cannot be read'):
+        assert text in said
+    poses = read_kitti(tmp_path / 'trajectory_kitti.txt')
+    assert np.isnan(poses[1:5, :3]).all(), 'one row a scan, so that rows and scans stay in step'
+    assert errors(poses[5], relative(street[0][2], street[1][2]))[0] < 0.1
+    assert len(np.loadtxt(tmp_path / 'trajectory.tum')) == 2
+
+
+def test_time_that_runs_backwards_starts_anew(street, tmp_path, capsys):
+    bag = tmp_path / 'bag'
+    write_bag(bag, [(*street[0][:2], 7 * PERIOD_NS), (*street[1][:2], 8 * PERIOD_NS)])
+    with BagReader(bag) as reader:
+        raw = [cdr(cloud.read()[2]) for cloud in reader.clouds('/points')]
+    again = write_raw(tmp_path / 'again', list(enumerate([*raw, *raw])))
+    assert main([str(again), '--output', str(tmp_path)]) == 0
+    assert summary(tmp_path)['restarts'] == [0, 2]
+    assert 'time ran backwards' in capsys.readouterr().err
+    np.testing.assert_array_equal(read_kitti(tmp_path / 'trajectory_kitti.txt')[2], np.eye(4))
+
+
+def test_missing_label_field_tells_the_fields(street, tmp_path, capsys):
+    bag = write_bag(tmp_path / 'bag', [(street[0][0], None, 0), (street[1][0], None, PERIOD_NS)])
+    assert main([str(bag), '--output', str(tmp_path)]) == 2
+    assert 'none of 2 clouds could be used: field label: the cloud has none; its fields are ' \
+        'x, y, z' in capsys.readouterr().err
+    assert main([str(bag), '--output', str(tmp_path), '--label-field', '']) == 0
+    assert summary(tmp_path)['successes'] == 2
+
+
+@pytest.fixture
+def two_topics(street, tmp_path):
+    points, labels, _ = street[0]
+    with BagWriter(tmp_path / 'two') as bag:
+        for topic, ids in (('/raw', None), ('/labelled', labels)):
+            bag.write(topic, point_cloud2(bag.types, points, ids, 5, 'lidar'), 5)
+    return tmp_path / 'two'
+
+
+def test_the_labelled_topic_is_found(two_topics, tmp_path):
+    assert main([str(two_topics), '--output', str(tmp_path)]) == 0
+    assert summary(tmp_path)['topic'] == '/labelled'
+
+
+@pytest.mark.parametrize(('options', 'says'), [
+    (['--label-field', 'other'], 'several topics of clouds, choose one by --topic: /raw, /lab'),
+    (['--topic', '/nope'], 'topic /nope: no clouds in .*; there are /raw, /labelled'),
+    (['--sigma-g', '-1'], 'sigma_g = -1.0: below the minimum'),
+    (['--mode', 'sideways'], "mode = 'sideways': not one of consecutive, keyframe"),
+    (['--odom-frame', '/odom'], 'no leading slash'),
+    (['--label-convention', 'klingon'], "label_convention = 'klingon'"),
+])
+def test_refusals(two_topics, tmp_path, capsys, options, says):
+    assert main([str(two_topics), '--output', str(tmp_path / 'out'), *options]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith('error: ')
+    assert re.search(says, said), said
+    assert not (tmp_path / 'out').exists()
+
+
+def test_bag_without_clouds(tmp_path, capsys):
+    with BagWriter(tmp_path / 'bag') as bag:
+        bag.write('/chatter', header(bag.types, 5, 'map'), 5)
+    assert main([str(tmp_path / 'bag')]) == 2
+    assert 'no PointCloud2 in this bag; its topics are /chatter' in capsys.readouterr().err
+
+
+def spoil(kind, street_bag, folder):
+    """Return a path that is no good bag."""
+    path = folder / 'bad'
+    if kind == 'missing':
+        return path
+    if kind in ('text', 'text.mcap', 'text.db3', 'text.bag'):
+        path = folder / kind
+        path.write_text('this is no bag\n' * 100)
+        return path
+    if kind == 'folder':
+        path.mkdir()
+        return path
+    shutil.copytree(street_bag, path)
+    mcap = next(path.glob('*.mcap'))
+    content = mcap.read_bytes()
+    if kind == 'metadata':
+        (path / 'metadata.yaml').write_text('nonsense: [')
+    elif kind == 'truncated':
+        mcap.write_bytes(content[:len(content) // 2])
+    elif kind == 'empty':
+        mcap.write_bytes(b'')
+    elif kind == 'garbage':
+        mcap.write_bytes(bytes(len(content)))
+    else:
+        mcap.unlink()
+    return path
+
+
+@pytest.mark.parametrize('kind', [
+    'missing', 'text', 'text.mcap', 'text.db3', 'text.bag', 'folder', 'metadata', 'truncated',
+    'empty', 'garbage', 'no storage'])
+def test_corrupt_bags(street_bag, tmp_path, capsys, kind):
+    path = spoil(kind, street_bag, tmp_path)
+    assert main([str(path), '--output', str(tmp_path / 'out')]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith(f'error: {path}: ')
+    assert 'Traceback' not in said
+
+
+def test_a_bag_that_breaks_off_keeps_what_came_before(street, tmp_path, capsys):
+    bag = write_raw(tmp_path / 'bag', [(i * PERIOD_NS, cdr(cloud_of(street, i, i * PERIOD_NS)))
+                                       for i in (0, 1, 2, 3)])
+    spoil_bytes(next(bag.glob('*.db3')), 0.6, 0.65)
+    assert main([str(bag), '--output', str(tmp_path)]) == 2
+    said = re.search(r'error: after (\d) scans: .*bag: cannot be read', capsys.readouterr().err)
+    assert summary(tmp_path)['successes'] == int(said[1]) > 0
+    assert len(read_kitti(tmp_path / 'trajectory_kitti.txt')) == int(said[1])
+
+
+def test_clouds_that_are_gone_are_told(street_bag, tmp_path, capsys):
+    bag = shutil.copytree(street_bag, tmp_path / 'bag')
+    spoil_bytes(next(bag.glob('*.mcap')), 0.6, 0.9)
+    assert main([str(bag), '--output', str(tmp_path)]) == 0
+    assert re.search(r'the bag tells of 4 clouds, only \d came', capsys.readouterr().err)
+    assert summary(tmp_path)['scans'] < 4
+
+
+def spoil_bytes(path, begin, end):
+    content = bytearray(path.read_bytes())
+    part = slice(int(begin * len(content)), int(end * len(content)))
+    content[part] = bytes(part.stop - part.start)
+    path.write_bytes(content)
+
+
+def test_other_kinds_of_bags(street, tmp_path):
+    store = get_typestore(Stores.ROS1_NOETIC)
+    cloud = cloud_of(street, 0, 7)
+    one = tmp_path / 'one.bag'
+    with Writer1(one) as bag:
+        head = store.types['std_msgs/msg/Header'](
+            seq=0, stamp=store.types['builtin_interfaces/msg/Time'](sec=0, nanosec=7),
+            frame_id='lidar')
+        field = store.types['sensor_msgs/msg/PointField']
+        message = store.types[CLOUD](
+            header=head, height=1, width=cloud.width, is_bigendian=False, is_dense=True,
+            fields=[field(f.name, f.offset, f.datatype, f.count) for f in cloud.fields],
+            point_step=cloud.point_step, row_step=cloud.row_step, data=cloud.data)
+        connection = bag.add_connection('/points', CLOUD, typestore=store)
+        bag.write(connection, 9, store.serialize_ros1(message, CLOUD))
+    two = write_raw(tmp_path / 'two', [(9, cdr(cloud))])
+    for path in (one, two, next(two.glob('*.db3'))):
+        with BagReader(path) as bag:
+            assert bag.find_topic('label') == '/points'
+            (found,) = bag.clouds('/points')
+            stamp_ns, frame, read = found.read()
+            assert (found.bag_time_ns, stamp_ns, frame) == (9, 7, 'lidar')
+            np.testing.assert_array_equal(np.asarray(read.data), cloud.data)
+
+
+def test_real_sequence(data_folder, tmp_path):
+    assert kitti_to_bag([str(data_folder / 'kitti/08'), str(tmp_path / 'bag')]) == 0
+    assert main([str(tmp_path / 'bag'), '--output', str(tmp_path)]) == 0
+    with AnyReader([tmp_path / 'bag']) as bag:
+        truth = [bag.deserialize(raw, c.msgtype) for c, _, raw in bag.messages()
+                 if c.topic == '/ground_truth']
+    poses = read_kitti(tmp_path / 'trajectory_kitti.txt')
+    p, q = truth[-1].pose.pose.position, truth[-1].pose.pose.orientation
+    assert np.linalg.norm(poses[-1, :3, 3] - [p.x, p.y, p.z]) < 0.3
+    turn = Rotation.from_matrix(poses[-1, :3, :3]).inv() * Rotation.from_quat([q.x, q.y, q.z, q.w])
+    assert np.degrees(turn.magnitude()) < 1.0
+    assert summary(tmp_path)['successes'] == 10
