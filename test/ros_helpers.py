@@ -95,7 +95,8 @@ class Partner:
         self._prefix = prefix
         self._context = Context()
         rclpy.init(context=self._context, domain_id=domain.id)
-        self.node = rclpy.create_node('partner', context=self._context)
+        self.node = rclpy.create_node(
+            'partner' + prefix.rstrip('/').replace('/', '_'), context=self._context)
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)
         self._points = self.node.create_publisher(

@@ -1,5 +1,6 @@
 """The node as users have it: a process of its own, real DDS, real clouds."""
 from importlib.util import find_spec
+import re
 import signal
 import subprocess
 import sys
@@ -27,8 +28,8 @@ from sgor_ros.world import simulate
 OK, WARN, ERROR = b'\x00', b'\x01', b'\x02'
 SECOND = 1_000_000_000
 SMALL = Lidar(beams=32, columns=600)
-TOLERANCE_M, TOLERANCE_RAD = 0.15, 0.01
-UINT8, FLOAT32, FLOAT64 = 2, 7, 8
+TOLERANCE_M, TOLERANCE_RAD = 0.15, 0.02
+FLOAT32, FLOAT64 = 7, 8
 
 
 @pytest.fixture(scope='module')
@@ -63,6 +64,7 @@ def shared_partner(domain, shared_node):
 @pytest.fixture
 def partner(shared_partner, shared_node):
     """Start with a node that has forgotten what other tests sent; it must survive the test."""
+    assert shared_node.alive(), shared_node.log()
     shared_partner.spin_for(0.1)
     assert shared_partner.call(Trigger, '/reset', Trigger.Request()).success
     shared_partner.forget()
@@ -232,6 +234,13 @@ def field_of_type(datatype):
     return change
 
 
+def a_fraction(cloud):
+    field_of_type(FLOAT32)(cloud)
+    records = np.frombuffer(cloud.data, np.uint8).reshape(-1, 16).copy()
+    records[:, 12:] = np.frombuffer(np.float32(40.5).tobytes(), np.uint8)
+    cloud.data[:] = type(cloud.data)('B', records.tobytes())
+
+
 def all_nan(cloud):
     cloud.data[:] = type(cloud.data)('B', np.full(len(cloud.data) // 4, np.nan, '<f4').tobytes())
 
@@ -242,15 +251,15 @@ def all_nan(cloud):
     (all_nan, ['finite']),
     (truncated, ['data', 'bytes']),
     (field_of_type(FLOAT64), ['label', 'point_step']),
-    (field_of_type(FLOAT32), ['label', 'not a whole number']),
+    (a_fraction, ['label', '40.5', 'not a whole number']),
     (field_of_type(99), ['label', '99']),
-], ids=['no label field', 'no points', 'all NaN', 'truncated', 'label too wide', 'label a fraction',
-        'label of no type'])
+], ids=['no label field', 'no points', 'all NaN', 'truncated', 'label too wide',
+        'label a fraction', 'label of no type'])
 def test_a_bad_cloud_is_named_and_the_node_goes_on(partner, shared_node, street, spoil, words):
     first, bad, good = clouds_of(street[:3])
     spoil(bad)
     assert partner.outcome(first)[0] == OK
-    level, message, values = partner.outcome(bad)
+    level, message, _ = partner.outcome(bad)
     assert level == ERROR
     for word in words:
         assert word in message
@@ -310,26 +319,51 @@ def test_labels_of_an_unknown_class_are_named_once(partner, shared_node, street)
     assert shared_node.log().count('23456') == 1
 
 
-def test_real_scans_at_ten_hertz(partner, data_folder):
+@pytest.fixture(scope='module')
+def kitti(data_folder):
+    """Return ten consecutive KITTI scans like `street`, at 10 Hz."""
     folder = data_folder / 'kitti/08'
-    clouds = []
-    for index in range(10):
-        points = np.fromfile(folder / f'velodyne/{index:06d}.bin', np.float32).reshape(-1, 4)
-        labels = np.fromfile(folder / f'labels/{index:06d}.label', np.uint32)
-        clouds.append(ros.cloud(points[:, :3], labels, 100 * SECOND + index * SECOND // 10))
-    partner.play(clouds, 0.1)
-    partner.spin_until(lambda: len(partner.odometry) == len(clouds))
-    assert [ros.stamp_ns_of(message.header) for message in partner.odometry] == [
-        ros.stamp_ns_of(cloud.header) for cloud in clouds]
     calibration = dict(line.split(':') for line in
                        (folder / 'calib.txt').read_text().splitlines() if ':' in line)
     Tr = np.vstack((np.array(calibration['Tr'].split(), float).reshape(3, 4), [0, 0, 0, 1]))
-    P = np.loadtxt(folder / 'poses.txt').reshape(-1, 3, 4)
-    first, last = (np.linalg.inv(Tr) @ np.vstack((P[k], [0, 0, 0, 1])) @ Tr for k in (0, 9))
-    metres, radians = ros.difference(ros.matrix(partner.odometry[-1].pose.pose),
-                                     np.linalg.inv(first) @ last)
+    scans = []
+    for index, P in enumerate(np.loadtxt(folder / 'poses.txt').reshape(-1, 3, 4)[:10]):
+        points = np.fromfile(folder / f'velodyne/{index:06d}.bin', np.float32).reshape(-1, 4)
+        labels = np.fromfile(folder / f'labels/{index:06d}.label', np.uint32)
+        pose = np.linalg.inv(Tr) @ np.vstack((P, [0, 0, 0, 1])) @ Tr
+        scans.append((100 * SECOND + index * SECOND // 10, points[:, :3], labels, pose))
+    return scans
+
+
+def assert_good_end(odometry, kitti):
+    assert ros.stamp_ns_of(odometry.header) == kitti[-1][0]
+    metres, radians = ros.difference(ros.matrix(odometry.pose.pose),
+                                     np.linalg.inv(kitti[0][3]) @ kitti[-1][3])
     assert metres < 0.3
     assert np.degrees(radians) < 1.0
+
+
+def test_real_scans_one_after_another(partner, kitti):
+    for cloud in clouds_of(kitti):
+        assert partner.outcome(cloud)[0] == OK
+    partner.spin_until(lambda: len(partner.odometry) == len(kitti))
+    assert [ros.stamp_ns_of(message.header) for message in partner.odometry] == [
+        scan[0] for scan in kitti]
+    assert_good_end(partner.odometry[-1], kitti)
+
+
+def test_real_scans_at_ten_hertz(partner, kitti):
+    """None is lost on the way, and each is processed or, on a busy machine, replaced."""
+    before = partner.outcome(clouds_of(kitti)[0])[2]
+    partner.play(clouds_of(kitti[1:]), 0.1)
+    partner.spin_until(lambda: partner.odometry and ros.stamp_ns_of(
+        partner.odometry[-1].header) == kitti[-1][0])
+    partner.spin_until(lambda: len(partner.diagnostics) == len(partner.odometry))
+    after = status(partner.diagnostics[-1])[2]
+    replaced = int(after['replaced']) - int(before['replaced'])
+    assert int(after['received']) - int(before['received']) == len(kitti) - 1
+    assert len(partner.odometry) == len(kitti) - replaced
+    assert_good_end(partner.odometry[-1], kitti)
 
 
 @pytest.mark.parametrize('how', [signal.SIGINT, signal.SIGTERM])
@@ -339,12 +373,13 @@ def test_a_signal_at_work_ends_it_cleanly(domain, street, tmp_path, how):
     try:
         partner.wait_for_node()
         partner.play(clouds_of(street[:4]), 0.02)
+        partner.spin_until(lambda: partner.diagnostics)
     finally:
         code = node.stop(how)
         partner.close()
     assert code == 0
     last = node.log().splitlines()[-1]
-    assert last.startswith('received 4, processed ')
+    assert re.fullmatch(r'received \d, processed \d, replaced \d, failed 0', last)
     assert 'Traceback' not in node.log()
 
 
@@ -360,7 +395,7 @@ def test_users_files_namespace_and_a_best_effort_driver(domain, street, tmp_path
         silent = ros.Partner(domain, '/unheard/')
         silent.spin_until(lambda: 'no clouds on /robot/points yet' in node.log(), 60.0)
         silent.close()
-        assert 'other topics with clouds: /unheard/points' in node.log()
+        assert '/unheard/points' in node.log()
         assert 'sigma_gg' in node.log()
         partner = ros.Partner(domain, '/robot/', ReliabilityPolicy.BEST_EFFORT)
         partner.spin_until(lambda: 'best effort' in node.log())
@@ -390,8 +425,9 @@ def test_a_reliable_only_node_says_what_it_cannot_hear(domain, tmp_path):
 
 @pytest.mark.parametrize(('argument', 'words'), [
     ('sigma_g:=9.0', ['sigma_g', '9.0', '5.0']),
-    pytest.param('publish_tf:=true', ['publish_tf', 'ros-jazzy-tf2-msgs'], marks=pytest.mark.skipif(
-        find_spec('tf2_msgs') is not None, reason='tf2_msgs is installed')),
+    pytest.param('publish_tf:=true', ['publish_tf', 'ros-jazzy-tf2-msgs'],
+                 marks=pytest.mark.skipif(find_spec('tf2_msgs') is not None,
+                                          reason='tf2_msgs is installed')),
 ])
 def test_what_cannot_work_ends_the_start_with_a_message(domain, argument, words):
     ran = subprocess.run([sys.executable, '-m', 'sgor_ros.ros.node', '--ros-args', '-p', argument],

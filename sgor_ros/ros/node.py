@@ -36,9 +36,9 @@ class SgorNode(Node):
 
     def __init__(self) -> None:
         super().__init__('sgor_node')
-        self._parameters = NodeParameters(self)
-        self._config = self._parameters.node_config
-        self._tracker = Tracker(*self._parameters.live)
+        self._settings = NodeParameters(self)
+        self._config = self._settings.node_config
+        self._tracker = Tracker(*self._settings.live)
         self._pose = self.create_publisher(PoseStamped, 'pose', 10)
         self._odometry = self.create_publisher(Odometry, 'odometry', 10)
         self._markers = self.create_publisher(MarkerArray, 'correspondences', 1)
@@ -95,7 +95,7 @@ class SgorNode(Node):
         begin = time.monotonic()
         said.start()
         try:
-            warm_up(self._parameters.live[0])
+            warm_up(self._settings.live[0])
         finally:
             said.cancel()
             said.join()
@@ -106,7 +106,7 @@ class SgorNode(Node):
         begin = time.monotonic()
         stamp_ns = messages.stamp_ns_of(cloud.header)
         frame = self._config.sensor_frame or cloud.header.frame_id
-        self._tracker.config, self._tracker.tracker_config = self._parameters.live
+        self._tracker.config, self._tracker.tracker_config = self._settings.live
         if self._reset_wanted.is_set():
             self._reset_wanted.clear()
             self._tracker.reset()

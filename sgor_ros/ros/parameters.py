@@ -49,6 +49,7 @@ class NodeConfig(Settings):
         False, 'Publish the transform from odom_frame to the sensor frame on /tf')
 
     def __post_init__(self) -> None:
+        """Refuse what is no frame id."""
         super().__post_init__()
         if not self.odom_frame:
             raise InputError("odom_frame = '': a frame needs a name")

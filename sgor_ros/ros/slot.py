@@ -1,12 +1,8 @@
 """Hand-over from the thread that receives to the thread that works: the newest scan wins."""
 import threading
-from typing import Generic
-from typing import TypeVar
-
-Item = TypeVar('Item')
 
 
-class NewestSlot(Generic[Item]):
+class NewestSlot[Item]:
     """Room for one item. A newer one takes its place, and what was replaced is counted."""
 
     def __init__(self) -> None:

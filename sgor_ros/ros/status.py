@@ -22,6 +22,7 @@ class Counts:
     failed: int = 0
 
     def __str__(self) -> str:
+        """Return the counts in one line."""
         return ', '.join(f'{name} {count}' for name, count in vars(self).items())
 
 
