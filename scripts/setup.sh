@@ -62,10 +62,11 @@ mapfile -t packages < <(missing_packages "$python")
 [ ${#packages[@]} -eq 0 ] || install_packages "${packages[@]}"
 
 extras=open3d,benchmark,test,dev
-options=()
+options=() pins=()
 if [ "${ROS_DISTRO:-}" = jazzy ] && "$python" -c 'import rclpy' 2>/dev/null; then
     say 'ROS 2 Jazzy is here: using its rclpy'
     options=(--system-site-packages)
+    pins=('numpy<2')    # what the messages of Jazzy are compiled against
 else
     say 'no ROS 2 Jazzy sourced: using its Python wheels'
     extras=ros,$extras
@@ -73,6 +74,7 @@ fi
 
 say "making $venv (one to three minutes)"
 "$python" -m venv --clear "${options[@]}" "$venv"
-"$venv/bin/python" -m pip install -qq --disable-pip-version-check --editable ".[$extras]"
+"$venv/bin/python" -m pip install -qq --disable-pip-version-check --editable ".[$extras]" \
+    "${pins[@]}"
 "$venv/bin/python" -c 'import open3d, rclpy, sgor_ros, small_gicp'
 say "ready: $venv/bin/python"

@@ -3,8 +3,8 @@ import argparse
 from collections.abc import Iterator
 from pathlib import Path
 import sys
-import time
 from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,12 +16,16 @@ from ..evaluation.track import TrackErrors
 from ..evaluation.track_plots import plot_errors
 from ..evaluation.track_plots import plot_track
 from ..io.bags import BagReader
+from .world_bag import WorldMap
 from .world_bag import write_world_bag
+
+if TYPE_CHECKING:
+    from ..ros.player import Heard
 
 Array = NDArray[np.float64]
 
 # beyond this, something is wrong with the node or with this machine
-WORST_DRIFT_PERCENT = 3.0
+WORST_DRIFT_PERCENT, LEAST_SHARE = 3.0, 0.5
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -68,36 +72,44 @@ def _run(options: argparse.Namespace) -> int:
     except OSError as error:
         raise InputError(f'--out {out}: {error.strerror}') from error
     bag = out / 'bag'
-    truth, world = write_world_bag(bag, options.scans, options.seed)
     isolate()
-    with NodeProcess(out / 'node.log') as node, Player() as player, BagReader(bag) as reader:
-        _say('starting sgor_node; the first start on a machine compiles, for a minute or two')
-        begin = time.monotonic()
-        if not player.wait_for_node(node.alive):
-            return _fail(f'sgor_node did not get ready; see {node.log}')
-        _say(f'ready after {time.monotonic() - begin:.1f} s; playing {len(truth)} scans at '
-             f'{options.rate:g} Hz')
-        memory = [node.memory_mb()]
-        clouds = tqdm(_clouds(reader), 'playing', len(truth), unit='scan', disable=None)
-        heard = player.play(clouds, 1 / options.rate, node.alive)
+    _say('starting sgor_node; the first start on a machine compiles, for a minute or two')
+    with NodeProcess(out / 'node.log') as node:
+        truth, world = write_world_bag(bag, options.scans, options.seed)
+        with Player() as player, BagReader(bag) as reader:
+            if not player.wait_for_node(node.alive):
+                return _fail(f'sgor_node did not get ready; see {node.log}')
+            _say(f'sgor_node is ready; playing {len(truth)} scans at {options.rate:g} Hz')
+            memory = [node.memory_mb()]
+            clouds = tqdm(_clouds(reader), 'playing', len(truth), unit='scan', disable=None)
+            heard = player.play(clouds, 1 / options.rate, node.alive)
         memory.append(node.memory_mb())
         alive = node.alive()
         code = node.stop()
     if not alive or code:
         return _fail(f'sgor_node ended with code {code}; see {node.log}')
+    return _compare(heard, truth, world, memory, options)
+
+
+def _compare(heard: 'Heard', truth: dict[int, Array], world: WorldMap, memory_mb: list[float],
+             options: argparse.Namespace) -> int:
+    """Print the table, write the pictures and judge."""
+    out: Path = options.out
     answered = [i for i, stamp in enumerate(heard.sent) if stamp in heard.poses]
+    few = f'{len(answered)} odometry messages for {len(heard.sent)} scans; see {out}/node.log'
     if len(answered) < 2:
-        return _fail(f'{len(answered)} odometry messages for {len(heard.sent)} scans; '
-                     f'see {node.log}')
+        return _fail(few)
     stamps = [heard.sent[i] for i in answered]
     errors = track_errors(np.array([heard.poses[stamp] for stamp in stamps]),
                           np.array([truth[stamp] for stamp in stamps]))
     seconds = np.array([heard.seconds.get(stamp, np.nan) for stamp in stamps])
     latency = np.array([heard.latency_s[stamp] for stamp in stamps])
-    _say(report(len(heard.sent), heard.counts, seconds, latency, errors, memory))
+    _say(report(len(heard.sent), heard.counts, seconds, latency, errors, memory_mb))
     plot_track(out / 'trajectory.png', errors, np.array(list(truth.values())), world)
     plot_errors(out / 'errors.png', errors, np.array(answered), seconds, 1 / options.rate)
-    _say(f'pictures: {out}/trajectory.png, {out}/errors.png; bag: {bag}')
+    _say(f'pictures: {out}/trajectory.png, {out}/errors.png; bag: {out}/bag')
+    if len(answered) < LEAST_SHARE * len(heard.sent):
+        return _fail(few)
     if errors.drift.stretches and not errors.drift.translation_percent < WORST_DRIFT_PERCENT:
         return _fail(f'the drift is above {WORST_DRIFT_PERCENT} %')
     return 0
