@@ -7,11 +7,15 @@ from .evidence import View
 from .scan import Registration
 
 
-def judge(result: Registration, source: View, target: View, config: SgorConfig) -> Registration:
-    """Add confidence and evidence to a candidate; refuse it below `min_confidence`."""
+def judge(result: Registration, source: View, target: View, reach: float,
+          config: SgorConfig) -> Registration:
+    """Add confidence and evidence to a candidate; refuse it below `min_confidence`.
+
+    `reach` is the farthest partner that counts, metres.
+    """
     if result.T_target_source is None:
         return result
-    found = evidence(source, target, result.T_target_source, config.evidence_reach)
+    found = evidence(source, target, result.T_target_source, reach)
     result = replace(result, confidence=found.confidence,
                      evidence={'agree': found.agree, 'contradict': found.contradict})
     if not result.success or found.confidence >= config.min_confidence:

@@ -52,7 +52,12 @@ class SgorConfig(Settings):
     vote_radius: float = setting(
         1.0, 'Neighbourhood of the regional label vote', 'm', minimum=0.0, maximum=20.0)
     max_correspondences: int = setting(
-        8000, 'More are thinned evenly', minimum=10, maximum=50000)
+        8000, 'Keypoints to match; more are thinned evenly', minimum=10, maximum=50000)
+    quick_keypoints: int = setting(
+        1500, 'Keypoints of a first attempt; all are matched only when that is refused. 0: no '
+        'first attempt (beyond the paper)', minimum=0, maximum=50000)
+    quick_groups: int = setting(
+        50, 'Groups of the first attempt', minimum=1, maximum=5000)
     match_within_labels: bool = setting(
         True, 'Match only points of the same regional label (beyond the paper)')
     height_gate: float = setting(
@@ -146,7 +151,7 @@ class SgorConfig(Settings):
     def paper(cls) -> Self:
         """Return the paper's steps and nothing besides."""
         return cls(robust_ground=False, match_within_labels=False, height_gate=0.0,
-                   context_weight=0.0, cloud_check=False,
+                   context_weight=0.0, quick_keypoints=0, cloud_check=False,
                    moving_vote=True, weight_cutoff=6.0, refinement_rounds=1, drop_ground_labels=False,
                    local_refinement=False,
                    min_confidence=0.0)

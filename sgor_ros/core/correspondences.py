@@ -120,6 +120,7 @@ def match(source: Features, target: Features, config: SgorConfig) -> Corresponde
     if source.descriptors.shape[1] != target.descriptors.shape[1]:
         raise InputError(f'descriptors: source has {source.descriptors.shape[1]} columns, target '
                          f'{target.descriptors.shape[1]}')
+    source = source[thin(len(source.points), config.max_correspondences)]
     none = source.heights is None or target.heights is None
     source_heights = np.zeros(len(source.points)) if none else source.heights
     target_heights = np.zeros(len(target.points)) if none else target.heights
@@ -139,7 +140,6 @@ def match(source: Features, target: Features, config: SgorConfig) -> Corresponde
         last[rows] = low + np.searchsorted(run, source_heights[rows] + gate, side='right')
     nearest = _nearest_in_runs(described, candidates[order], first, last)
     found = np.flatnonzero(nearest >= 0)
-    found = found[thin(found.size, config.max_correspondences)]
     s, t = source[found], target[order[nearest[found]]]
     return Correspondences(s.points, t.points, s.labels, t.labels, s.regional, t.regional)
 

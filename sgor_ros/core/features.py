@@ -34,13 +34,9 @@ def normals(points: NDArray[np.float64], neighbours: Neighbours,
     (V, 3) float64
         ``(0, 0, 1)`` turned to the sensor where fewer than three points lie within the radius.
     """
-    scatter = np.empty((len(points), 3, 3))
-    _scatter(points, neighbours.start, neighbours.index, neighbours.squared, radius * radius,
-             scatter)
-    found = np.linalg.eigh(scatter)[1][:, :, 0]
-    away = np.einsum('ij,ij->i', found, points) > 0
-    found[away] *= -1.0
-    return np.ascontiguousarray(found)
+    found = np.empty((len(points), 3))
+    _normals(points, neighbours.start, neighbours.index, neighbours.squared, radius * radius, found)
+    return found
 
 
 def fpfh(points: NDArray[np.float64], point_normals: NDArray[np.float64],
@@ -82,7 +78,7 @@ def _sum_votes(own, start, index, squared, limit, votes):  # type: ignore[no-unt
 
 
 @numba.njit(cache=True, nogil=True, parallel=True)
-def _scatter(points, start, index, squared, limit, scatter):  # type: ignore[no-untyped-def]
+def _normals(points, start, index, squared, limit, found):  # type: ignore[no-untyped-def]
     for i in numba.prange(len(points)):
         n = 0
         # sums of differences to the point itself: no cancellation far from the origin
@@ -103,15 +99,58 @@ def _scatter(points, start, index, squared, limit, scatter):  # type: ignore[no-
                 syy += y * y
                 syz += y * z
                 szz += z * z
-        if n < 3:
-            scatter[i] = np.diag(np.array([1.0, 1.0, 0.0]))
-            continue
-        scatter[i, 0, 0] = sxx / n - sx * sx / (n * n)
-        scatter[i, 1, 1] = syy / n - sy * sy / (n * n)
-        scatter[i, 2, 2] = szz / n - sz * sz / (n * n)
-        scatter[i, 0, 1] = scatter[i, 1, 0] = sxy / n - sx * sy / (n * n)
-        scatter[i, 0, 2] = scatter[i, 2, 0] = sxz / n - sx * sz / (n * n)
-        scatter[i, 1, 2] = scatter[i, 2, 1] = syz / n - sy * sz / (n * n)
+        x, y, z = 0.0, 0.0, 1.0
+        if n >= 3:
+            x, y, z = _smallest_direction(
+                sxx / n - sx * sx / (n * n), sxy / n - sx * sy / (n * n),
+                sxz / n - sx * sz / (n * n), syy / n - sy * sy / (n * n),
+                syz / n - sy * sz / (n * n), szz / n - sz * sz / (n * n))
+        sign = -1.0 if x * points[i, 0] + y * points[i, 1] + z * points[i, 2] > 0 else 1.0
+        found[i, 0] = sign * x
+        found[i, 1] = sign * y
+        found[i, 2] = sign * z
+
+
+@numba.njit(cache=True, nogil=True)
+def _smallest_direction(xx, xy, xz, yy, yz, zz):  # type: ignore[no-untyped-def]
+    """Return the unit eigenvector of the smallest eigenvalue of a symmetric 3 x 3 matrix."""
+    mean = (xx + yy + zz) / 3
+    a, b, c = xx - mean, yy - mean, zz - mean
+    spread = math.sqrt((a * a + b * b + c * c + 2 * (xy * xy + xz * xz + yz * yz)) / 6)
+    if spread < 1e-12:
+        return 0.0, 0.0, 1.0
+    det = (a * (b * c - yz * yz) - xy * (xy * c - yz * xz) + xz * (xy * yz - b * xz))
+    half = min(max(det / (2 * spread**3), -1.0), 1.0)
+    smallest = mean + 2 * spread * math.cos(math.acos(half) / 3 + 2 * math.pi / 3)
+    a, b, c = xx - smallest, yy - smallest, zz - smallest
+    # rows of A - lambda I span the other two directions: the longest cross product is safest
+    x1, y1, z1 = xy * yz - xz * b, xz * xy - a * yz, a * b - xy * xy
+    x2, y2, z2 = xy * c - xz * yz, xz * xz - a * c, a * yz - xy * xz
+    x3, y3, z3 = b * c - yz * yz, yz * xz - xy * c, xy * yz - b * xz
+    l1, l2, l3 = x1 * x1 + y1 * y1 + z1 * z1, x2 * x2 + y2 * y2 + z2 * z2, \
+        x3 * x3 + y3 * y3 + z3 * z3
+    if l1 < l2:
+        x1, y1, z1, l1 = x2, y2, z2, l2
+    if l1 < l3:
+        x1, y1, z1, l1 = x3, y3, z3, l3
+    if l1 < 1e-24 * spread**4:
+        # the two smaller ones are equal (points on a line): any direction across it will do
+        x1, y1, z1 = _across(a, xy, xz, yy - smallest, yz, c)
+        l1 = x1 * x1 + y1 * y1 + z1 * z1
+    scale = 1.0 / math.sqrt(l1)
+    return x1 * scale, y1 * scale, z1 * scale
+
+
+@numba.njit(cache=True, nogil=True)
+def _across(a, xy, xz, b, yz, c):  # type: ignore[no-untyped-def]
+    """Return a direction across the longest row of a symmetric matrix of rank one."""
+    if a >= b and a >= c:
+        x, y, z = a, xy, xz
+    elif b >= c:
+        x, y, z = xy, b, yz
+    else:
+        x, y, z = xz, yz, c
+    return (y, -x, 0.0) if abs(x) + abs(y) > abs(z) else (0.0, z, -y)
 
 
 @numba.njit(cache=True, nogil=True, inline='always')

@@ -43,58 +43,61 @@ def radius_neighbours(points: NDArray[np.float64], radius: float) -> Neighbours:
     cell = radius
     while np.prod(np.floor(extent / cell) + 3.0) > MAX_CELLS:
         cell *= 1.5
-    shape = np.floor(extent / cell).astype(np.int64) + 3
     # a border of empty cells on each side spares the bounds checks
-    coordinates = np.floor((points - low) / cell).astype(np.int64) + 1
-    cells = (coordinates[:, 0] * shape[1] + coordinates[:, 1]) * shape[2] + coordinates[:, 2]
+    shape = np.floor(extent / cell).astype(np.int64) + 3
+    x, y, z = np.floor((points - low) / cell).astype(np.int64).T + 1
+    cells = (x * shape[1] + y) * shape[2] + z
     order = np.argsort(cells, kind='stable').astype(np.int32)
-    first = np.searchsorted(cells[order], np.arange(np.prod(shape) + 1)).astype(np.int32)
+    first = np.zeros(np.prod(shape) + 1, np.int32)
+    np.cumsum(np.bincount(cells, minlength=np.prod(shape)), out=first[1:])
+    columns = np.ascontiguousarray(points[order].T)
     start = np.zeros(len(points) + 1, np.int64)
-    _count(points, cells, order, first, shape[1], shape[2], radius, start)
+    _count(columns, cells[order], order, first, shape[1], shape[2], radius, start)
     np.cumsum(start, out=start)
     index = np.empty(start[-1], np.int32)
     squared = np.empty(start[-1], np.float32)
-    _fill(points, cells, order, first, shape[1], shape[2], radius, start, index, squared)
+    _fill(columns, cells[order], order, first, shape[1], shape[2], radius, start, index, squared)
     return Neighbours(start, index, squared)
 
 
+@numba.njit(cache=True, nogil=True, inline='always')
+def _squared(columns, i, j):  # type: ignore[no-untyped-def]
+    a = columns[0, j] - columns[0, i]
+    b = columns[1, j] - columns[1, i]
+    c = columns[2, j] - columns[2, i]
+    return a * a + b * b + c * c
+
+
 @numba.njit(cache=True, nogil=True, parallel=True)
-def _count(points, cells, order, first, ny, nz, radius, start):  # type: ignore[no-untyped-def]
+def _count(columns, cells, order, first, ny, nz, radius, start):  # type: ignore[no-untyped-def]
     limit = radius * radius
-    for i in numba.prange(len(points)):
+    for at in numba.prange(len(order)):
+        i = np.int64(at)
         found = 0
         for dx in range(-1, 2):
             for dy in range(-1, 2):
                 row = cells[i] + (dx * ny + dy) * nz
-                for k in range(first[row - 1], first[row + 2]):
-                    j = order[k]
-                    a = points[j, 0] - points[i, 0]
-                    b = points[j, 1] - points[i, 1]
-                    c = points[j, 2] - points[i, 2]
-                    if a * a + b * b + c * c <= limit:
-                        found += 1
-        start[i + 1] = found
+                for j in range(first[row - 1], first[row + 2]):
+                    found += _squared(columns, i, j) <= limit
+        start[order[i] + 1] = found
 
 
 @numba.njit(cache=True, nogil=True, parallel=True)
-def _fill(points, cells, order, first, ny, nz, radius, start,
+def _fill(columns, cells, order, first, ny, nz, radius, start,
           index, squared):  # type: ignore[no-untyped-def]
     limit = radius * radius
-    for i in numba.prange(len(points)):
-        at = start[i]
-        index[at] = i
-        squared[at] = 0.0
-        at += 1
+    for at in numba.prange(len(order)):
+        i = np.int64(at)
+        slot = start[order[i]]
+        index[slot] = order[i]
+        squared[slot] = 0.0
+        slot += 1
         for dx in range(-1, 2):
             for dy in range(-1, 2):
                 row = cells[i] + (dx * ny + dy) * nz
-                for k in range(first[row - 1], first[row + 2]):
-                    j = order[k]
-                    a = points[j, 0] - points[i, 0]
-                    b = points[j, 1] - points[i, 1]
-                    c = points[j, 2] - points[i, 2]
-                    d = a * a + b * b + c * c
+                for j in range(first[row - 1], first[row + 2]):
+                    d = _squared(columns, i, j)
                     if d <= limit and j != i:
-                        index[at] = j
-                        squared[at] = d
-                        at += 1
+                        index[slot] = order[j]
+                        squared[slot] = d
+                        slot += 1

@@ -17,7 +17,7 @@ def refine(T_target_source: NDArray[np.float64], correspondences: Correspondence
     """
     T = T_target_source
     for _ in range(config.refinement_rounds):
-        near = inliers(T, correspondences, config.tau_1)
+        near = distances(T, correspondences.source, correspondences.target) < config.tau_1
         if near.sum() < MIN_POINTS:
             break
         p, q = correspondences.source[near], correspondences.target[near]
@@ -25,8 +25,9 @@ def refine(T_target_source: NDArray[np.float64], correspondences: Correspondence
     return T
 
 
-def inliers(T_target_source: NDArray[np.float64], correspondences: Correspondences,
-            reach: float) -> NDArray[np.bool_]:
-    """Return which correspondences lie within `reach` metres under a transformation, (N,)."""
-    moved = se3.transform(T_target_source, correspondences.source)
-    return np.linalg.norm(moved - correspondences.target, axis=1) < reach
+def distances(T_target_source: NDArray[np.float64], source: NDArray[np.float64],
+              target: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return how far each match lies apart under a transformation, (N,) metres."""
+    residual: NDArray[np.float64] = np.linalg.norm(
+        se3.transform(T_target_source, source) - target, axis=1)
+    return residual

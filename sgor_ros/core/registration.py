@@ -1,4 +1,5 @@
 """SGOR on one screen: `register` two scans, `solve` for the transformation of matches."""
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -19,7 +20,7 @@ from .grouping import group
 from .hypotheses import hypothesise
 from .hypotheses import MIN_POINTS
 from .preprocessing import preprocess
-from .refinement import inliers
+from .refinement import distances
 from .refinement import refine
 from .scan import PreparedScan
 from .scan import Registration
@@ -52,6 +53,29 @@ def register(source: SemanticScan | PreparedScan, target: SemanticScan | Prepare
     with clock('preprocessing'):
         source = source if isinstance(source, PreparedScan) else preprocess(source, config)
         target = target if isinstance(target, PreparedScan) else preprocess(target, config)
+    for attempt in _attempts(config):
+        result = _globally(source, target, attempt, clock)
+        if result.success:
+            break
+    with clock('alignment'):
+        result = _locally(result, source, target, config)
+    return replace(result, source_ground=source.ground, target_ground=target.ground,
+                   warnings=(*(f'source: {w}' for w in source.warnings),
+                             *(f'target: {w}' for w in target.warnings)))
+
+
+def _attempts(config: SgorConfig) -> Iterator[SgorConfig]:
+    """Yield the settings of a quick attempt with few keypoints, then those of all."""
+    if 0 < config.quick_keypoints < config.max_correspondences:
+        yield config.replace(max_correspondences=config.quick_keypoints,
+                             groups=min(config.groups, config.quick_groups),
+                             group_size=min(config.group_size, config.quick_keypoints // 4))
+    yield config
+
+
+def _globally(source: PreparedScan, target: PreparedScan, config: SgorConfig,
+              clock: Stopwatch) -> Registration:
+    """Match, solve, and ask the clouds whether to believe it (Sec. III-B to III-E)."""
     with clock('matching'):
         p, q = source.features, target.features
         if config.correspondence_preprocessing:
@@ -60,17 +84,22 @@ def register(source: SemanticScan | PreparedScan, target: SemanticScan | Prepare
     normals = (None if source.ground is None or target.ground is None
                else (source.ground.normal, target.ground.normal))
     result = solve(correspondences, normals, (source.view, target.view), config, clock)
-    with clock('alignment'):
-        if result.success and source.surface and target.surface:
-            local = align(source.surface, target.surface, result.T_target_source, config)
-            result = replace(result, T_target_source=local.T_target_source,
-                             covariance=local.covariance,
-                             inliers=inliers(local.T_target_source, correspondences, config.tau_1))
     with clock('acceptance'):
-        result = judge(result, source.view, target.view, config)
-    return replace(result, source_ground=source.ground, target_ground=target.ground,
-                   warnings=(*(f'source: {w}' for w in source.warnings),
-                             *(f'target: {w}' for w in target.warnings)))
+        return judge(result, source.view, target.view, source.view.cell, config)
+
+
+def _locally(result: Registration, source: PreparedScan, target: PreparedScan,
+             config: SgorConfig) -> Registration:
+    """Refine on the clouds and judge again, now by near partners (beyond the paper)."""
+    if not result.success or result.T_target_source is None:
+        return result
+    if source.surface is not None and target.surface is not None:
+        local = align(source.surface, target.surface, result.T_target_source, config)
+        agree = distances(local.T_target_source, result.source_points,
+                          result.target_points) < config.tau_1
+        result = replace(result, T_target_source=local.T_target_source,
+                         covariance=local.covariance, inliers=agree)
+    return judge(result, source.view, target.view, config.evidence_reach, config)
 
 
 def register_correspondences(source_points: ArrayLike, target_points: ArrayLike,
@@ -126,7 +155,7 @@ def solve(correspondences: Correspondences, ground_normals: Normals | None,
         return replace(found, reason=verdict.reason)
     with clock('refinement'):
         T = refine(hypotheses.T_target_source[verdict.best], correspondences, config)
-        agree = inliers(T, correspondences, config.tau_1)
+        agree = distances(T, correspondences.source, correspondences.target) < config.tau_1
     if agree.sum() < config.min_inliers:
         return replace(found, T_target_source=T, inliers=agree,
                        reason=f'only {agree.sum()} inliers, min_inliers is {config.min_inliers}')
