@@ -71,10 +71,12 @@ class NodeProcess:
     def alive(self):
         return self.process.poll() is None
 
-    def stop(self, how=signal.SIGINT, timeout_s=30.0):
-        """Send a signal and return the exit code."""
-        if self.alive():
-            self.process.send_signal(how)
+    def stop(self, how=signal.SIGINT, times=1, timeout_s=30.0):
+        """Send a signal, once or more, and return the exit code."""
+        for _ in range(times):
+            if self.alive():
+                self.process.send_signal(how)
+                time.sleep(0.02)
         try:
             return self.process.wait(timeout_s)
         except subprocess.TimeoutExpired:

@@ -366,8 +366,9 @@ def test_real_scans_at_ten_hertz(partner, kitti):
     assert_good_end(partner.odometry[-1], kitti)
 
 
-@pytest.mark.parametrize('how', [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_at_work_ends_it_cleanly(domain, street, tmp_path, how):
+@pytest.mark.parametrize(('how', 'times'), [(signal.SIGINT, 1), (signal.SIGINT, 2),
+                                             (signal.SIGTERM, 1)])
+def test_a_signal_at_work_ends_it_cleanly(domain, street, tmp_path, how, times):
     node = ros.NodeProcess(domain, tmp_path / 'log', '-r', '__ns:=/ending')
     partner = ros.Partner(domain, '/ending/')
     try:
@@ -375,7 +376,7 @@ def test_a_signal_at_work_ends_it_cleanly(domain, street, tmp_path, how):
         partner.play(clouds_of(street[:4]), 0.02)
         partner.spin_until(lambda: partner.diagnostics)
     finally:
-        code = node.stop(how)
+        code = node.stop(how, times)
         partner.close()
     assert code == 0
     last = node.log().splitlines()[-1]

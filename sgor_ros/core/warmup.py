@@ -10,7 +10,7 @@ from .scan import SemanticScan
 def warm_up(config: SgorConfig) -> None:
     """Register a small made-up scene to itself, so that the first real scan does not wait."""
     rng = np.random.default_rng(0)
-    size = 40 * config.voxel_size
+    size = 40 * min(config.voxel_size, 5.0)    # max_range has a bound
     walls = rng.uniform(-size, size, (3000, 3))
     walls[:1000, 2], walls[1000:2000, 0], walls[2000:, 1] = -size / 4, size, size
     prepared = preprocess(SemanticScan(walls, np.zeros(len(walls), np.int64)),

@@ -1,4 +1,5 @@
 """`sgor_node`: labelled clouds in, poses out. It converts, calls the tracker and publishes."""
+import signal
 import sys
 import threading
 import time
@@ -106,6 +107,8 @@ class SgorNode(Node):
         begin = time.monotonic()
         stamp_ns = messages.stamp_ns_of(cloud.header)
         frame = self._config.sensor_frame or cloud.header.frame_id
+        if not frame:
+            self._log.once('the clouds have no frame_id: set the parameter sensor_frame')
         self._tracker.config, self._tracker.tracker_config = self._settings.live
         if self._reset_wanted.is_set():
             self._reset_wanted.clear()
@@ -163,6 +166,8 @@ def main(args: list[str] | None = None) -> int:
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
     finally:
+        # a terminal and ros2 launch both send one; the first is enough
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
         if node is not None:
             node.stop()
         rclpy.try_shutdown()
