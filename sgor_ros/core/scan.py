@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from .alignment import Surface
 from .checks import as_labels
 from .checks import as_points
+from .checks import finite_rows
 from .config import SgorConfig
 from .correspondences import Features
 from .evidence import View
@@ -38,12 +39,14 @@ class SemanticScan:
 
     def __init__(self, points: ArrayLike, labels: ArrayLike | None = None) -> None:
         clean = as_points(points, 'points', np.float32)
-        finite = np.isfinite(clean).all(axis=1)
+        ids = None if labels is None else as_labels(labels, len(clean), 'labels')
+        finite = finite_rows(clean)
         if not finite.any():
             raise InputError(f'points: none of {len(clean)} is finite' if len(clean)
                              else 'points: the scan is empty')
-        ids = None if labels is None else as_labels(labels, len(clean), 'labels')[finite]
-        object.__setattr__(self, 'points', np.ascontiguousarray(clean[finite]))
+        if not finite.all():
+            clean, ids = clean[finite], None if ids is None else ids[finite]
+        object.__setattr__(self, 'points', np.ascontiguousarray(clean))
         object.__setattr__(self, 'labels', ids)
 
     def __len__(self) -> int:
