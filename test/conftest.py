@@ -7,6 +7,8 @@ import pytest
 
 from sgor_ros.io.bags import BagWriter
 from sgor_ros.io.messages import point_cloud2
+from sgor_ros.world import Lidar
+from sgor_ros.world import simulate
 
 PERIOD_NS = 100_000_000
 
@@ -24,9 +26,8 @@ def data_folder():
 @pytest.fixture(scope='session')
 def street():
     """Return scans of a street 1.5 m apart: (points, labels, T_world_sensor) of each."""
-    world = pytest.importorskip('sgor_ros.world')
-    lidar = world.Lidar(beams=64, columns=900)
-    return [scan[1:] for scan in world.simulate(4, seed=0, lidar=lidar, speed=15.0)]
+    lidar = Lidar(beams=64, columns=900)
+    return [scan[1:] for scan in simulate(4, seed=0, lidar=lidar, speed=15.0)]
 
 
 @pytest.fixture(scope='session')

@@ -53,7 +53,7 @@ def consistency_graph(correspondences: Correspondences, config: SgorConfig) -> C
     index = np.empty(upper[-1], np.int32)
     _list_pairs(columns, np.float32(reach + PREFILTER_SLACK), upper, index)
     gap = np.empty(upper[-1], np.float32)
-    degree = _exact_gaps(p, q, upper, index, reach, gap)
+    degree = _exact_gaps(p, q, upper, index, config.sigma_d, reach, gap)
     return _symmetric(upper, index, gap, degree, config.sigma_d)
 
 
@@ -104,8 +104,9 @@ def _near(columns, i, j, reach):  # type: ignore[no-untyped-def]
     c = columns[5, j] - columns[5, i]
     q = a * a + b * b + c * c
     r = reach * reach
-    s = np.float32(2.0) * (p + q) - r
-    return ((p - q) * (p - q) <= r * s) | (s <= np.float32(0.0))
+    s = p + q
+    # (a^2 - b^2)^2 = x (2 s - x) with x = (a - b)^2 grows with x up to x = s
+    return ((p - q) * (p - q) <= r * (s + s - r)) | (s <= r)
 
 
 @numba.njit(cache=True, nogil=True, parallel=True)
@@ -146,8 +147,8 @@ def _list_pairs(columns, reach, upper, index):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True, parallel=True)
-def _exact_gaps(p, q, upper, index, reach, gap):  # type: ignore[no-untyped-def]
-    """Write d_ij, infinite where beyond `reach`; return the kept pairs of each row."""
+def _exact_gaps(p, q, upper, index, sigma_d, reach, gap):  # type: ignore[no-untyped-def]
+    """Write d_ij, minus d_ij beyond sigma_d, infinite beyond `reach`; return the row sizes."""
     n = len(p)
     kept = np.zeros(n, np.int64)
     for i in numba.prange(n):
@@ -158,7 +159,7 @@ def _exact_gaps(p, q, upper, index, reach, gap):  # type: ignore[no-untyped-def]
             b = np.sqrt((q[i, 0] - q[j, 0]) ** 2 + (q[i, 1] - q[j, 1]) ** 2
                         + (q[i, 2] - q[j, 2]) ** 2)
             d = abs(a - b)
-            gap[k] = d if d <= reach else np.inf
+            gap[k] = d if d <= sigma_d else -d if d <= reach else np.inf
     for i in range(n):
         for k in range(upper[i], upper[i + 1]):
             if gap[k] < np.inf:
@@ -195,7 +196,7 @@ def _mirror(upper, index, gap, sigma_d, start, inner, full, weight):  # type: ig
                 continue
             j = index[k]
             w = np.exp(scale * d * d)
-            if d <= sigma_d:
+            if d >= 0:
                 full[inner[i]] = j
                 weight[inner[i]] = w
                 inner[i] += 1

@@ -1,0 +1,147 @@
+"""The sparse compiled path against the dense reference of the paper's equations."""
+import dense_reference as dense
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from sgor_ros import register_correspondences
+from sgor_ros import SgorConfig
+from sgor_ros.core.consistency import consistency_graph
+from sgor_ros.core.consistency import label_agreement
+from sgor_ros.core.consistency import seed_rows
+from sgor_ros.core.correspondences import Correspondences
+from sgor_ros.core.grouping import group
+from sgor_ros.core.grouping import leading_eigenvector
+
+CUTOFFS = (1.0, 6.0)
+
+
+def random_matches(n, share, seed, labels=4):
+    """Return Correspondences of which a share is right, and T_target_source."""
+    rng = np.random.default_rng(seed)
+    T = np.eye(4)
+    T[:3, :3] = Rotation.random(random_state=seed).as_matrix()
+    T[:3, 3] = rng.uniform(-20, 20, 3)
+    source = rng.uniform(-40, 40, (n, 3))
+    target = source @ T[:3, :3].T + T[:3, 3] + rng.normal(0, 0.05, (n, 3))
+    wrong = rng.permutation(n)[:round(n * (1 - share))]
+    target[wrong] = rng.uniform(-40, 40, (len(wrong), 3))
+    s, t, s2, t2 = rng.integers(1, labels, (4, n)).astype(np.uint8)
+    return Correspondences(source, target, s, t, s2, t2), T
+
+
+def real_matches(folder, name):
+    """Return Correspondences of a KITTI set and T_target_source."""
+    source = np.loadtxt(folder / f'correspondences/kitti_{name}_source.txt')
+    target = np.loadtxt(folder / f'correspondences/kitti_{name}_target.txt')
+    T = np.loadtxt(folder / f'correspondences/kitti_{name}_T_target_source.txt').reshape(-1, 4)
+    labels = np.random.default_rng(0).integers(1, 4, (4, len(source))).astype(np.uint8)
+    return Correspondences(source, target, *labels), np.vstack((T[:3], [0, 0, 0, 1]))
+
+
+def dense_graph(graph):
+    """Return the consistent part and all weights of a sparse graph as (N, N) matrices."""
+    n = len(graph.inner)
+    consistent, weights = np.zeros((n, n)), np.zeros((n, n))
+    for i in range(n):
+        consistent[i, graph.index[graph.start[i]:graph.inner[i]]] = 1
+        row = slice(graph.start[i], graph.start[i + 1])
+        weights[i, graph.index[row]] = graph.weight[row]
+    return consistent, weights
+
+
+def assert_graph_and_rows(matches, config):
+    """Assert that graph, eigenvector and seed rows equal the dense ones."""
+    graph = consistency_graph(matches, config)
+    gaps = dense.pair_gaps(matches.source, matches.target)
+    consistent, weights = dense.geometric_consistency(gaps, config.sigma_d, config.weight_cutoff)
+    found, found_weights = dense_graph(graph)
+    # a pair within rounding of the threshold may fall on either side
+    edge = np.abs(gaps - config.sigma_d) < 1e-9
+    assert np.array_equal(found[~edge], consistent[~edge])
+    np.testing.assert_allclose(found_weights, weights, atol=1e-6)
+    np.testing.assert_allclose(leading_eigenvector(graph),
+                               dense.leading_eigenvector(consistent * weights), atol=1e-5)
+
+    groups = group(matches, graph, config)
+    rows = seed_rows(graph, groups, *label_agreement(matches, config.semantics))
+    tight = dense.semantic_consistency(matches.source_labels, matches.target_labels)
+    loose = dense.semantic_consistency(matches.source_regional, matches.target_regional)
+    for key, members, row in zip(groups.keys, groups.members, rows):
+        expected = dense.group_matrix(members, consistent, weights, tight, loose)
+        seed = list(members).index(key)
+        np.testing.assert_allclose(row, expected[seed], rtol=1e-5, atol=1e-5)
+
+
+@pytest.mark.parametrize('cutoff', CUTOFFS)
+@pytest.mark.parametrize(('n', 'share', 'seed'), [(40, 0.5, 0), (301, 0.1, 1), (500, 0.9, 2)])
+def test_random_matches_equal_the_dense_reference(n, share, seed, cutoff):
+    """Graph, weights, eigenvector and rows of M* are those of the equations."""
+    matches, _ = random_matches(n, share, seed)
+    assert_graph_and_rows(matches, SgorConfig(
+        groups=10, group_size=30, group_keep=8, sigma_d=0.5, weight_cutoff=cutoff))
+
+
+@pytest.mark.parametrize('name', ['000', '010', '020'])
+def test_real_matches_equal_the_dense_reference(data_folder, name):
+    """The same on real FPFH matches, thinned so that the dense matrices fit."""
+    matches, _ = real_matches(data_folder, name)
+    rows = np.arange(0, len(matches), 5)
+    thinned = Correspondences(*(getattr(matches, f)[rows] for f in (
+        'source', 'target', 'source_labels', 'target_labels', 'source_regional',
+        'target_regional')))
+    assert_graph_and_rows(thinned, SgorConfig(groups=10, group_size=50, weight_cutoff=6.0))
+
+
+@pytest.mark.parametrize('name', ['000', '010', '020'])
+def test_solver_equals_the_dense_solver(data_folder, name):
+    """Matches in, transformation out: the paper preset and the equations agree to 1e-5."""
+    matches, _ = real_matches(data_folder, name)
+    config = SgorConfig.paper().replace(groups=30, group_size=200, key_spacing=0.0)
+    rows = np.arange(0, len(matches), 3)
+    source, target = matches.source[rows], matches.target[rows]
+    result = register_correspondences(source, target, config=config)
+    expected = dense.solve(source, target, config.sigma_d, config.weight_cutoff, config.groups,
+                           config.group_size, config.group_keep, config.tau_1)
+    np.testing.assert_allclose(result.T_target_source, expected, atol=1e-5)
+
+
+def test_semantics_settings():
+    """None keeps all; hard drops what disagrees in points; loose takes either."""
+    matches, _ = random_matches(60, 1.0, 3)
+    tight = matches.source_labels == matches.target_labels
+    regional = matches.source_regional == matches.target_regional
+    assert all(a.all() for a in label_agreement(matches, 'none'))
+    assert np.array_equal(label_agreement(matches, 'hard')[0], tight)
+    assert not label_agreement(matches, 'hard')[1].any()
+    assert np.array_equal(label_agreement(matches, 'loose')[1], regional)
+
+
+def test_rigid_motion_changes_nothing():
+    """Moving the target moves the answer and nothing else."""
+    matches, T = random_matches(800, 0.15, 4)
+    move = np.eye(4)
+    move[:3, :3] = Rotation.from_euler('zyx', [2.0, 0.4, -0.7]).as_matrix()
+    move[:3, 3] = 5.0, -60.0, 2.0
+    plain = register_correspondences(matches.source, matches.target)
+    moved = register_correspondences(
+        matches.source, matches.target @ move[:3, :3].T + move[:3, 3])
+    np.testing.assert_allclose(moved.T_target_source, move @ plain.T_target_source, atol=1e-6)
+    np.testing.assert_allclose(plain.T_target_source, T, atol=0.05)
+
+
+def test_order_of_matches_changes_nothing():
+    """A permutation of the rows gives the same transformation."""
+    matches, _ = random_matches(800, 0.15, 5)
+    order = np.random.default_rng(0).permutation(len(matches))
+    plain = register_correspondences(matches.source, matches.target)
+    mixed = register_correspondences(matches.source[order], matches.target[order])
+    np.testing.assert_allclose(mixed.T_target_source, plain.T_target_source, atol=1e-6)
+    assert np.array_equal(mixed.inliers, plain.inliers[order])
+
+
+def test_memory_of_8000_matches(data_folder):
+    """The graph of 8,000 matches takes a small part of what N x N would."""
+    matches, _ = random_matches(8000, 0.02, 6)
+    graph = consistency_graph(matches, SgorConfig())
+    assert graph.index.nbytes + graph.weight.nbytes < 0.05 * 8000 * 8000 * 8
