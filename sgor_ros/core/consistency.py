@@ -15,7 +15,8 @@ from .correspondences import Correspondences
 from .grouping import Groups
 
 PREFILTER_SLACK = 1e-3
-"""Metres: float32 finds the candidate pairs, float64 decides; errors stay far below this."""
+"""Metres: float32 finds the candidate pairs, float64 decides. In a scan of 100 m the former errs
+by some 1e-5."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,14 +48,20 @@ def consistency_graph(correspondences: Correspondences, config: SgorConfig) -> C
     reach = config.sigma_d * config.weight_cutoff
     columns = np.ascontiguousarray(np.hstack((p - p.mean(axis=0), q - q.mean(axis=0))).T,
                                    np.float32)
+    bits = np.empty((n, n // 8 + 1), np.uint8)
     upper = np.zeros(n + 1, np.int64)
-    _count_pairs(columns, np.float32(reach + PREFILTER_SLACK), upper)
+    _mark_pairs(columns, np.float32((reach + PREFILTER_SLACK)**2), bits, upper)
     np.cumsum(upper, out=upper)
     index = np.empty(upper[-1], np.int32)
-    _list_pairs(columns, np.float32(reach + PREFILTER_SLACK), upper, index)
-    gap = np.empty(upper[-1], np.float32)
-    degree = _exact_gaps(p, q, upper, index, config.sigma_d, reach, gap)
-    return _symmetric(upper, index, gap, degree, config.sigma_d)
+    weight = np.empty(upper[-1], np.float32)
+    degree = _weigh_pairs(p, q, bits, config.sigma_d, reach, upper, index, weight)
+    start = np.zeros(n + 1, np.int64)
+    np.cumsum(degree + 1, out=start[1:])
+    inner = np.empty(n, np.int64)
+    full_index = np.empty(start[-1], np.int32)
+    full_weight = np.empty(start[-1], np.float32)
+    _mirror(upper, index, weight, start, inner, full_index, full_weight)
+    return ConsistencyGraph(start, inner, full_index, full_weight)
 
 
 def seed_rows(graph: ConsistencyGraph, groups: Groups, tight: NDArray[np.bool_],
@@ -92,124 +99,106 @@ def label_agreement(correspondences: Correspondences,
     return tight, c.source_regional == c.target_regional
 
 
-@numba.njit(cache=True, nogil=True, inline='always')
-def _near(columns, i, j, reach):  # type: ignore[no-untyped-def]
-    """Whether | |p_i - p_j| - |q_i - q_j| | <= reach, without a square root."""
-    a = columns[0, j] - columns[0, i]
-    b = columns[1, j] - columns[1, i]
-    c = columns[2, j] - columns[2, i]
-    p = a * a + b * b + c * c
-    a = columns[3, j] - columns[3, i]
-    b = columns[4, j] - columns[4, i]
-    c = columns[5, j] - columns[5, i]
-    q = a * a + b * b + c * c
-    r = reach * reach
-    s = p + q
-    # (a^2 - b^2)^2 = x (2 s - x) with x = (a - b)^2 grows with x up to x = s
-    return ((p - q) * (p - q) <= r * (s + s - r)) | (s <= r)
+@numba.njit(cache=True, nogil=True, fastmath=True)
+def _mark_row(columns, i, limit, near):  # type: ignore[no-untyped-def]
+    """Write whether (|p_i - p_j| - |q_i - q_j|)^2 <= limit for all j > i, without a square root.
+
+    Slices from i + 1 on, and not an index that starts there, let the compiler use vectors.
+    """
+    px, py, pz, qx, qy, qz = columns[:, i]
+    ax, ay, az = columns[0, i + 1:], columns[1, i + 1:], columns[2, i + 1:]
+    bx, by, bz = columns[3, i + 1:], columns[4, i + 1:], columns[5, i + 1:]
+    for j in range(len(ax)):
+        x, y, z = ax[j] - px, ay[j] - py, az[j] - pz
+        p = x * x + y * y + z * z
+        x, y, z = bx[j] - qx, by[j] - qy, bz[j] - qz
+        q = x * x + y * y + z * z
+        s = p + q
+        # (a^2 - b^2)^2 = d (2 s - d) with d = (a - b)^2 grows with d up to d = s
+        near[j] = np.uint8(((p - q) * (p - q) <= limit * (s + s - limit)) | (s <= limit))
 
 
 @numba.njit(cache=True, nogil=True, parallel=True)
-def _count_pairs(columns, reach, upper):  # type: ignore[no-untyped-def]
+def _mark_pairs(columns, limit, bits, upper):  # type: ignore[no-untyped-def]
+    """Set bit j - i - 1 of row i for each candidate pair; count them into upper[i + 1]."""
     n = columns.shape[1]
-    # row i beside row n - 1 - i: every pair of rows costs the same
-    for half in numba.prange((n + 1) // 2):
-        for side in range(2):
-            i = np.int64(half) if side == 0 else n - 1 - np.int64(half)
-            if side == 1 and i == np.int64(half):
-                continue
-            found = np.int32(0)
-            for j in range(i + 1, n):
-                found += np.int32(_near(columns, i, j, reach))
+    gather = np.uint64(0x0102040810204080)    # eight bytes of 0 or 1 to eight bits
+    add = np.uint64(0x0101010101010101)
+    for task in numba.prange((n + 1) // 2):
+        half = np.int64(task)
+        near = np.zeros(n // 8 * 8 + 8, np.uint8)
+        words = near.view(np.uint64)
+        # row i beside row n - 1 - i: all tasks cost the same
+        for i in ((half, n - 1 - half) if half != n - 1 - half else (half, half)):
+            _mark_row(columns, i, limit, near)
+            near[n - 1 - i:] = 0
+            found = np.int64(0)
+            for w in range((n - 1 - i) // 8 + 1):
+                bits[i, w] = (words[w] * gather) >> np.uint64(56)
+                found += np.int64((words[w] * add) >> np.uint64(56))
             upper[i + 1] = found
 
 
 @numba.njit(cache=True, nogil=True, parallel=True)
-def _list_pairs(columns, reach, upper, index):  # type: ignore[no-untyped-def]
-    n = columns.shape[1]
-    for half in numba.prange((n + 1) // 2):
-        near = np.zeros(n + 8, np.uint8)
-        words = near[:n // 8 * 8 + 8].view(np.uint64)
-        for side in range(2):
-            i = np.int64(half) if side == 0 else n - 1 - np.int64(half)
-            if side == 1 and i == np.int64(half):
-                continue
-            for j in range(i + 1, n):
-                near[j] = _near(columns, i, j, reach)
-            near[:i + 1] = 0
-            at = upper[i]
-            for word in range((i + 1) // 8, len(words)):
-                if words[word] != 0:
-                    for j in range(8 * word, 8 * word + 8):
-                        if near[j]:
-                            index[at] = j
-                            at += 1
+def _weigh_pairs(p, q, bits, sigma_d, reach, upper, index,
+                 weight):  # type: ignore[no-untyped-def]
+    """Write W_m of each candidate pair, negative beyond sigma_d, 0 beyond `reach`.
 
-
-@numba.njit(cache=True, nogil=True, parallel=True)
-def _exact_gaps(p, q, upper, index, sigma_d, reach, gap):  # type: ignore[no-untyped-def]
-    """Write d_ij, minus d_ij beyond sigma_d, infinite beyond `reach`; return the row sizes."""
+    Returns the pairs of each correspondence, (N,).
+    """
     n = len(p)
-    kept = np.zeros(n, np.int64)
     for i in numba.prange(n):
-        for k in range(upper[i], upper[i + 1]):
-            j = index[k]
-            a = np.sqrt((p[i, 0] - p[j, 0]) ** 2 + (p[i, 1] - p[j, 1]) ** 2
-                        + (p[i, 2] - p[j, 2]) ** 2)
-            b = np.sqrt((q[i, 0] - q[j, 0]) ** 2 + (q[i, 1] - q[j, 1]) ** 2
-                        + (q[i, 2] - q[j, 2]) ** 2)
-            d = abs(a - b)
-            gap[k] = d if d <= sigma_d else -d if d <= reach else np.inf
+        at = upper[i]
+        for w in range((n - 1 - np.int64(i)) // 8 + 1):
+            if bits[i, w]:
+                for b in range(8):
+                    if (bits[i, w] >> b) & 1:
+                        j = np.int64(i) + 1 + 8 * w + b
+                        index[at] = j
+                        d = abs(np.sqrt((p[i, 0] - p[j, 0]) ** 2 + (p[i, 1] - p[j, 1]) ** 2
+                                        + (p[i, 2] - p[j, 2]) ** 2)
+                                - np.sqrt((q[i, 0] - q[j, 0]) ** 2 + (q[i, 1] - q[j, 1]) ** 2
+                                          + (q[i, 2] - q[j, 2]) ** 2))
+                        value = np.exp(-0.5 * (d / sigma_d) ** 2)
+                        weight[at] = value if d <= sigma_d else -value if d <= reach else 0.0
+                        at += 1
+    degree = np.zeros(n, np.int64)
     for i in range(n):
         for k in range(upper[i], upper[i + 1]):
-            if gap[k] < np.inf:
-                kept[i] += 1
-                kept[index[k]] += 1
-    return kept
-
-
-def _symmetric(upper: NDArray[np.int64], index: NDArray[np.int32], gap: NDArray[np.float32],
-               degree: NDArray[np.int64], sigma_d: float) -> ConsistencyGraph:
-    start = np.zeros(len(degree) + 1, np.int64)
-    np.cumsum(degree + 1, out=start[1:])
-    inner = np.empty(len(degree), np.int64)
-    full = np.empty(start[-1], np.int32)
-    weight = np.empty(start[-1], np.float32)
-    _mirror(upper, index, gap, np.float32(sigma_d), start, inner, full, weight)
-    return ConsistencyGraph(start, inner, full, weight)
+            if weight[k] != 0:
+                degree[i] += 1
+                degree[index[k]] += 1
+    return degree
 
 
 @numba.njit(cache=True, nogil=True)
-def _mirror(upper, index, gap, sigma_d, start, inner, full, weight):  # type: ignore[no-untyped-def]
+def _mirror(upper, index, weight, start, inner, full_index,
+            full_weight):  # type: ignore[no-untyped-def]
     """Write each pair into both of its rows: consistent ones from the front, others behind."""
     n = len(inner)
     end = start[1:].copy()
     for i in range(n):
-        full[start[i]] = i
-        weight[start[i]] = 1.0
+        full_index[start[i]] = i
+        full_weight[start[i]] = 1.0
         inner[i] = start[i] + 1
-    scale = np.float32(-0.5) / (sigma_d * sigma_d)
     for i in range(n):
         for k in range(upper[i], upper[i + 1]):
-            d = gap[k]
-            if d == np.inf:
-                continue
             j = index[k]
-            w = np.exp(scale * d * d)
-            if d >= 0:
-                full[inner[i]] = j
-                weight[inner[i]] = w
+            w = weight[k]
+            if w > 0:
+                full_index[inner[i]] = j
+                full_weight[inner[i]] = w
                 inner[i] += 1
-                full[inner[j]] = i
-                weight[inner[j]] = w
+                full_index[inner[j]] = i
+                full_weight[inner[j]] = w
                 inner[j] += 1
-            else:
+            elif w < 0:
                 end[i] -= 1
-                full[end[i]] = j
-                weight[end[i]] = w
+                full_index[end[i]] = j
+                full_weight[end[i]] = -w
                 end[j] -= 1
-                full[end[j]] = i
-                weight[end[j]] = w
+                full_index[end[j]] = i
+                full_weight[end[j]] = -w
 
 
 @numba.njit(cache=True, nogil=True, parallel=True)
