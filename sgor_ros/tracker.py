@@ -23,7 +23,7 @@ class TrackerConfig(Settings):
     """Which scan each scan is registered to."""
 
     mode: str = setting(
-        'consecutive', 'Register to the scan before, or to the last keyframe',
+        'keyframe', 'Register to the scan before, or to the last keyframe',
         choices=('consecutive', 'keyframe'))
     keyframe_distance: float = setting(
         5.0, 'A scan farther from its keyframe becomes the next', 'm', minimum=0.1, maximum=100.0)
@@ -144,6 +144,12 @@ class Tracker:
 
     def _begin(self, prepared: PreparedScan, stamp_ns: int, T_odom_sensor: NDArray[np.float64],
                covariance: NDArray[np.float64] | None, warnings: list[str]) -> TrackedScan:
+        keypoints = len(prepared.features.points)
+        if keypoints < self.config.min_inliers:
+            # nothing could ever be registered to it
+            return TrackedScan(stamp_ns, False, f'only {keypoints} keypoints to start from', None,
+                               None, None, None, None, False, False, tuple(warnings),
+                               dict(prepared.timings))
         self._failures = 0
         self._reference = _Reference(prepared, stamp_ns, T_odom_sensor, covariance)
         return TrackedScan(stamp_ns, True, '', T_odom_sensor, covariance, None, None, None, True,

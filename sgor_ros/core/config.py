@@ -54,10 +54,10 @@ class SgorConfig(Settings):
     max_correspondences: int = setting(
         8000, 'Keypoints to match; more are thinned evenly', minimum=10, maximum=50000)
     quick_keypoints: int = setting(
-        1500, 'Keypoints of a first attempt; all are matched only when that is refused. 0: no '
+        1000, 'Keypoints of a first attempt; all are matched only when that is refused. 0: no '
         'first attempt (beyond the paper)', minimum=0, maximum=50000)
     quick_groups: int = setting(
-        50, 'Groups of the first attempt', minimum=1, maximum=5000)
+        40, 'Groups of the first attempt', minimum=1, maximum=5000)
     match_within_labels: bool = setting(
         True, 'Match only points of the same regional label (beyond the paper)')
     height_gate: float = setting(
@@ -108,9 +108,9 @@ class SgorConfig(Settings):
     local_refinement: bool = setting(
         True, 'Refine on the clouds by GICP, from which a covariance follows')
     local_voxel_size: float = setting(
-        0.3, 'Voxel grid of the local refinement', 'm', minimum=0.01, maximum=5.0)
+        0.4, 'Voxel grid of the local refinement', 'm', minimum=0.01, maximum=5.0)
     local_reach: float = setting(
-        1.0, 'Farthest pair of points that the local refinement uses', 'm',
+        0.5, 'Farthest pair of points that the local refinement uses', 'm',
         minimum=0.02, maximum=10.0)
     min_inliers: int = setting(
         10, 'Fewer inliers are a failure', minimum=3, maximum=10000)

@@ -69,7 +69,7 @@ def _attempts(config: SgorConfig) -> Iterator[SgorConfig]:
     if 0 < config.quick_keypoints < config.max_correspondences:
         yield config.replace(max_correspondences=config.quick_keypoints,
                              groups=min(config.groups, config.quick_groups),
-                             group_size=min(config.group_size, config.quick_keypoints // 4))
+                             group_size=max(config.quick_keypoints // 8, config.group_keep + 1))
     yield config
 
 

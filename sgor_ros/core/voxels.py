@@ -86,37 +86,45 @@ def _accumulate(points, columns, voxel_size, n_classes):  # type: ignore[no-unty
     """Hash each point to its voxel; sum coordinates and votes."""
     n = len(points)
     n_slots = 1
-    while n_slots < 2 * n + 1:
+    while n_slots < n:
         n_slots *= 2
     slots = np.full(n_slots, -1, np.int32)
     keys = np.empty(n, np.int64)
     voxel = np.empty(n, np.int32)
     count = 0
-    inverse = 1.0 / voxel_size
+    inverse = np.float32(1.0 / voxel_size)
+    last_key = np.int64(-1)
+    last = 0
     for i in range(n):
         # 21 bits a coordinate: +-1 million voxels
         key = (((np.int64(np.floor(points[i, 0] * inverse)) & 0x1FFFFF) << 42)
                | ((np.int64(np.floor(points[i, 1] * inverse)) & 0x1FFFFF) << 21)
                | (np.int64(np.floor(points[i, 2] * inverse)) & 0x1FFFFF))
-        slot = (key * np.int64(-7046029254386353131) >> 20) & (n_slots - 1)
-        while slots[slot] >= 0 and keys[slots[slot]] != key:
-            slot = (slot + 1) & (n_slots - 1)
-        if slots[slot] < 0:
-            slots[slot] = count
-            keys[count] = key
-            count += 1
-        voxel[i] = slots[slot]
+        if key != last_key:    # a beam often stays in the same voxel
+            slot = ((key * np.int64(-7046029254386353131)) >> 32) & (n_slots - 1)
+            while slots[slot] >= 0 and keys[slots[slot]] != key:
+                slot = (slot + 1) & (n_slots - 1)
+            if slots[slot] < 0:
+                slots[slot] = count
+                keys[count] = key
+                count += 1
+            last_key = key
+            last = slots[slot]
+        voxel[i] = last
     sums = np.zeros((count, 3))
     members = np.zeros(count)
     votes = np.zeros((count, n_classes), np.int32)
     for i in range(n):
         v = voxel[i]
-        for axis in range(3):
-            sums[v, axis] += points[i, axis]
+        sums[v, 0] += points[i, 0]
+        sums[v, 1] += points[i, 1]
+        sums[v, 2] += points[i, 2]
         members[v] += 1.0
         if columns[i] >= 0:
             votes[v, columns[i]] += 1
     for v in range(count):
-        for axis in range(3):
-            sums[v, axis] /= members[v]
+        scale = 1.0 / members[v]
+        sums[v, 0] *= scale
+        sums[v, 1] *= scale
+        sums[v, 2] *= scale
     return sums, votes
