@@ -1,0 +1,264 @@
+"""What is registered to what: scans with known poses, right pairs and wrong pairs of them."""
+from collections.abc import Callable
+from collections.abc import Iterable
+from collections.abc import Iterator
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from itertools import combinations
+import json
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from ..core import se3
+from ..core.config import SgorConfig
+from ..core.scan import SemanticScan
+from ..core.settings import InputError
+from ..io.scans import read_scan
+from ..io.trajectories import read_kitti
+
+Array = NDArray[np.float64]
+
+LABEL_FOLDERS = {'labels': 'semantickitti', 'predicted_labels': 'semantickitti_train'}
+"""Where labels lie beside `velodyne`, best first, and what 32-bit ids there mean."""
+
+NO_OVERLAP_M = 100.0
+"""Scans of one drive farther apart than this see different places."""
+
+BYTES_PER_POINT = 16
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """One scan of a drive.
+
+    Attributes
+    ----------
+    name : str
+    data_set : str
+        What it is counted under in tables.
+    label_convention : str
+    read : callable
+        Returns the `SemanticScan`.
+    """
+
+    name: str
+    data_set: str
+    label_convention: str
+    read: Callable[[], SemanticScan]
+
+
+@dataclass(frozen=True, eq=False)
+class Drive:
+    """Scans of one place in the order of recording; other drives are other places.
+
+    Attributes
+    ----------
+    name : str
+    frames : sequence of Frame
+    T_world_sensor : (N, 4, 4) float64 or None
+        True poses.
+    heights_known : bool
+        Whether the heights of the poses are as good as the rest.
+    """
+
+    name: str
+    frames: Sequence[Frame]
+    T_world_sensor: Array | None
+    heights_known: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class Pair:
+    """Two scans to register.
+
+    Attributes
+    ----------
+    source, target : Frame
+    T_target_source : (4, 4) float64 or None
+        The truth; None where the scans are of different drives.
+    right : bool
+        Whether they see the same place, so that there is something to find.
+    heights_known : bool
+        Whether the truth is good in z.
+    """
+
+    source: Frame
+    target: Frame
+    T_target_source: Array | None
+    right: bool = True
+    heights_known: bool = True
+
+    @property
+    def data_set(self) -> str:
+        """What it is counted under in tables."""
+        return ' x '.join(sorted({self.source.data_set, self.target.data_set}))
+
+    @property
+    def distance_m(self) -> float:
+        """Distance of the sensors; NaN for different drives."""
+        return (float('nan') if self.T_target_source is None
+                else float(np.linalg.norm(self.T_target_source[:3, 3])))
+
+
+def read_drives(folder: Path) -> list[Drive]:
+    """Find the drives of a data folder: each folder that holds a folder ``velodyne``.
+
+    Beside ``velodyne/*.bin`` there may be ``labels`` or ``predicted_labels``, ``poses.txt``, and
+    ``calib.txt`` whose ``Tr`` maps LiDAR to camera where the poses are those of a camera.
+
+    Parameters
+    ----------
+    folder : Path
+        A drive itself, or the drives are one or two levels below.
+
+    Raises
+    ------
+    InputError
+        No drive there, or a file of one cannot be read.
+    """
+    found = [path.parent for level in ('', '*/', '*/*/')
+             for path in sorted(folder.glob(f'{level}velodyne')) if path.is_dir()]
+    if not found:
+        raise InputError(f'{folder}: no folder velodyne in it or in two levels below')
+    return [_read_drive(path, folder) for path in found]
+
+
+def _read_drive(path: Path, root: Path) -> Drive:
+    name = str(path.relative_to(root)) if path != root else path.resolve().name
+    frames = [frame(scan, _best_labels(scan), f'{name}/{scan.stem}')
+              for scan in sorted((path / 'velodyne').glob('*.bin'))]
+    if not frames:
+        raise InputError(f'{path}/velodyne: no .bin in it')
+    poses = None
+    if (path / 'poses.txt').is_file():
+        poses = _sensor_poses(path)
+        if len(poses) < len(frames):
+            raise InputError(f'{path}/poses.txt: {len(poses)} poses for {len(frames)} scans')
+    return Drive(name, frames, poses, frames[0].data_set != 'nuscenes')
+
+
+def frame(scan: Path, labels: Path | None, name: str) -> Frame:
+    """Describe a scan in files; what its labels mean follows from their folder and size."""
+    convention = SgorConfig().label_convention
+    if labels is not None and labels.is_file():
+        one_byte = labels.stat().st_size * BYTES_PER_POINT == scan.stat().st_size
+        convention = 'nuscenes' if one_byte else LABEL_FOLDERS[labels.parent.name]
+    data_set = 'nuscenes' if convention == 'nuscenes' else 'kitti'
+    return Frame(name, data_set, convention, partial(read_scan, scan, labels))
+
+
+def _best_labels(scan: Path) -> Path | None:
+    candidates = (scan.parents[1] / folder / f'{scan.stem}.label' for folder in LABEL_FOLDERS)
+    return next((path for path in candidates if path.is_file()), None)
+
+
+def _sensor_poses(path: Path) -> Array:
+    """Return the poses of the LiDAR, (N, 4, 4); camera poses are turned into them by Tr."""
+    poses = read_kitti(path / 'poses.txt')
+    if not (path / 'calib.txt').is_file():
+        return poses
+    rows = [line.split()[1:] for line in (path / 'calib.txt').read_text().splitlines()
+            if line.startswith('Tr')]
+    if not rows or len(rows[0]) != 12:
+        raise InputError(f'{path}/calib.txt: expected a line "Tr:" and 12 numbers')
+    T_camera_sensor = np.eye(4)
+    T_camera_sensor[:3] = np.array(rows[0], np.float64).reshape(3, 4)
+    return np.asarray(se3.inverse(T_camera_sensor) @ poses @ T_camera_sensor)
+
+
+def drive_of(name: str, scans: Iterable[tuple[NDArray[np.float32], NDArray[np.uint32], Array]]
+             ) -> Drive:
+    """Make a drive of scans in memory: points, raw SemanticKITTI labels, T_world_sensor."""
+    frames, poses = [], []
+    for index, (points, labels, T_world_sensor) in enumerate(scans):
+        frames.append(Frame(f'{name}/{index:06d}', 'world', 'semantickitti',
+                            partial(SemanticScan, points, labels)))
+        poses.append(T_world_sensor)
+    return Drive(name, frames, np.array(poses))
+
+
+def near_pairs(drives: Sequence[Drive], max_distance_m: float) -> list[Pair]:
+    """Return all pairs of scans of a drive up to a distance, the later scan as the source."""
+    pairs = []
+    for drive in drives:
+        if drive.T_world_sensor is None:
+            continue
+        T = drive.T_world_sensor[:len(drive.frames)]
+        for i, j in sorted(cKDTree(T[:, :3, 3]).query_pairs(max_distance_m)):
+            pairs.append(Pair(drive.frames[j], drive.frames[i], se3.inverse(T[i]) @ T[j],
+                              heights_known=drive.heights_known))
+    return pairs
+
+
+def listed_pairs(folder: Path, max_distance_m: float) -> list[Pair]:
+    """Return the pairs of ``pairs.json``, each with each of its labels.
+
+    Those of drives with poses are left out: they are found by their poses.
+    """
+    listing = folder / 'pairs.json'
+    if not listing.is_file():
+        return []
+    pairs = []
+    try:
+        for entry in json.loads(listing.read_text()):
+            if (folder / entry['source']).parents[1].joinpath('poses.txt').is_file():
+                continue
+            truth = np.array(entry['T_target_source'], np.float64)
+            for source_labels in entry['source_labels']:
+                for target_labels in entry['target_labels']:
+                    source, target = (
+                        frame(folder / scan, folder / labels, labels.removesuffix('.label'))
+                        for scan, labels in ((entry['source'], source_labels),
+                                             (entry['target'], target_labels)))
+                    pairs.append(Pair(source, target, truth))
+    except (ValueError, KeyError, TypeError) as error:
+        raise InputError(f'{listing}: expected source, target, their labels and T_target_source '
+                         f'of each pair: {error!r}') from error
+    return [pair for pair in pairs if pair.distance_m <= max_distance_m]
+
+
+def choose(pairs: Sequence[Pair], count: int, seed: int) -> list[Pair]:
+    """Choose up to `count` pairs at random, evenly over the data sets."""
+    data_sets = sorted({pair.data_set for pair in pairs})
+    return _in_turns([[pair for pair in pairs if pair.data_set == data_set]
+                      for data_set in data_sets], count, seed)
+
+
+def wrong_pairs(drives: Sequence[Drive], count: int, seed: int) -> list[Pair]:
+    """Return up to `count` pairs of scans of different places, evenly over all pairs of drives.
+
+    Scans of one drive count as different places where they are over `NO_OVERLAP_M` apart.
+    """
+    kinds = [[Pair(a, b, None, right=False) for a in one.frames for b in other.frames]
+             for one, other in combinations(drives, 2)]
+    kinds += [far for drive in drives if (far := list(_far_pairs(drive)))]
+    return _in_turns(kinds, count, seed)
+
+
+def _in_turns(kinds: Sequence[Sequence[Pair]], count: int, seed: int) -> list[Pair]:
+    """Take one of each kind at a time, each in random order."""
+    rng = np.random.default_rng(seed)
+    shuffled = [[kind[i] for i in rng.permutation(len(kind))[:count]] for kind in kinds]
+    turns = range(max(map(len, shuffled), default=0))
+    return [kind[i] for i in turns for kind in shuffled if i < len(kind)][:count]
+
+
+def _far_pairs(drive: Drive) -> Iterator[Pair]:
+    if drive.T_world_sensor is None:
+        return
+    T = drive.T_world_sensor
+    for i, j in combinations(range(len(drive.frames)), 2):
+        if np.linalg.norm(T[i, :3, 3] - T[j, :3, 3]) > NO_OVERLAP_M:
+            yield Pair(drive.frames[j], drive.frames[i], se3.inverse(T[i]) @ T[j], right=False,
+                       heights_known=drive.heights_known)
+
+
+def random_labels(labels: NDArray[np.int64], share: float, rng: np.random.Generator
+                  ) -> NDArray[np.int64]:
+    """Replace a share of the labels (N,) by random ones of those that occur."""
+    wrong = rng.random(len(labels)) < share
+    return np.where(wrong, rng.choice(np.unique(labels), len(labels)), labels)

@@ -1,0 +1,132 @@
+"""How long the solver takes: matches in, transformation out."""
+from collections.abc import Callable
+from collections.abc import Iterator
+from collections.abc import Mapping
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+import time
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+from tqdm import tqdm
+
+from ..core import se3
+from ..core.config import SgorConfig
+from ..core.registration import register_correspondences
+from ..core.settings import InputError
+from .metrics import rotation_error_deg
+from .metrics import translation_error_m
+
+Array = NDArray[np.float64]
+Dense = Callable[..., Array]
+
+BOX_M, NOISE_M = 100.0, 0.1
+DENSE_GROUPS = 20
+"""Groups in the comparison with the dense reference, which would need minutes for all."""
+
+
+@dataclass(frozen=True, eq=False)
+class Matches:
+    """Correspondences with a known answer.
+
+    Attributes
+    ----------
+    name : str
+    source, target : (N, 3) float64
+    T_target_source : (4, 4) float64
+    """
+
+    name: str
+    source: Array
+    target: Array
+    T_target_source: Array
+
+
+@dataclass(frozen=True)
+class Solved:
+    """Times of one solver on one set of matches; RE in degrees, TE in metres, NaN if it failed."""
+
+    solver: str
+    matches: str
+    count: int
+    inlier_share: float
+    seconds_median: float
+    seconds_p95: float
+    runs: int
+    rotation_error_deg: float
+    translation_error_m: float
+
+
+def made_up(count: int, inlier_share: float, seed: int) -> Matches:
+    """Return random points in a box, a share of them moved alike and with noise."""
+    rng = np.random.default_rng(seed)
+    source = rng.uniform(0, BOX_M, (count, 3))
+    T = se3.compose(Rotation.random(random_state=seed).as_matrix(), rng.uniform(-20, 20, 3))
+    target = rng.uniform(0, BOX_M, (count, 3))
+    right = rng.permutation(count)[:max(round(inlier_share * count), 3)]
+    target[right] = se3.transform(T, source[right]) + rng.normal(0, NOISE_M, (len(right), 3))
+    return Matches('made up', source, target, T)
+
+
+def real_matches(folder: Path) -> Iterator[Matches]:
+    """Yield the sets in ``correspondences``: ``NAME_source.txt``, ``_target``, the truth."""
+    for path in sorted((folder / 'correspondences').glob('*_source.txt')):
+        name = path.name.removesuffix('_source.txt')
+        if name.endswith('_T_target'):
+            continue
+        try:
+            source, target, T = (np.loadtxt(path.with_name(f'{name}_{what}.txt'))
+                                 for what in ('source', 'target', 'T_target_source'))
+        except (OSError, ValueError) as error:
+            raise InputError(f'{path.with_name(name)}_*.txt: {error}') from error
+        yield Matches(name, source, target, T)
+
+
+def run_solver(sets: Sequence[Matches], config: SgorConfig, runs: int) -> list[Solved]:
+    """Time the default and the paper's settings in turns, after a run to warm up."""
+    configs = {'SGOR': config, "SGOR, paper's settings": SgorConfig.paper().replace(
+        threads=config.threads)}
+    solvers = {name: partial(_solve, config=c) for name, c in configs.items()}
+    return [row for matches in tqdm(sets, unit='set', disable=None)
+            for row in _timed(matches, solvers, runs, config.tau_1)]
+
+
+def run_dense(sets: Sequence[Matches], dense: Dense) -> list[Solved]:
+    """Time the dense reference and the sparse path in the same settings, once each."""
+    config = SgorConfig.paper().replace(groups=DENSE_GROUPS)
+    solvers: dict[str, Callable[[Matches], Any]] = {
+        f'dense numpy, {DENSE_GROUPS} groups': lambda m: dense(
+            m.source, m.target, config.sigma_d, config.weight_cutoff, config.groups,
+            config.group_size, config.group_keep, config.tau_1),
+        f'SGOR, {DENSE_GROUPS} groups': partial(_solve, config=config)}
+    return [row for matches in tqdm(sets, 'dense', unit='set', disable=None)
+            for row in _timed(matches, solvers, 1, config.tau_1)]
+
+
+def _solve(matches: Matches, config: SgorConfig) -> Array | None:
+    result = register_correspondences(matches.source, matches.target, config=config)
+    return result.T_target_source if result.success else None
+
+
+def _timed(matches: Matches, solvers: Mapping[str, Callable[[Matches], Any]], runs: int,
+           reach_m: float) -> Iterator[Solved]:
+    seconds: dict[str, list[float]] = {name: [] for name in solvers}
+    answers = {}
+    # the first round only warms up, unless it is the only one
+    for _ in range(runs + 1 if runs > 1 else 1):
+        for name, solve in solvers.items():
+            start = time.perf_counter()
+            answers[name] = solve(matches)
+            seconds[name].append(time.perf_counter() - start)
+    truth = matches.T_target_source
+    residuals = np.linalg.norm(se3.transform(truth, matches.source) - matches.target, axis=1)
+    for name, taken in seconds.items():
+        T, counted = answers[name], taken[-runs:]
+        yield Solved(name, matches.name, len(matches.source), float((residuals < reach_m).mean()),
+                     float(np.median(counted)), float(np.percentile(counted, 95)), runs,
+                     float('nan') if T is None else rotation_error_deg(T, truth),
+                     float('nan') if T is None else translation_error_m(T, truth))
