@@ -5,8 +5,8 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-MAX_CELLS = 4_000_000
-"""Bound on the memory of the search grid; beyond it cells grow, which only costs time."""
+MAX_CELLS = 250_000
+"""Bound on the search grid: beyond it empty cells would cost more than longer candidate lists."""
 
 
 @dataclass(frozen=True)

@@ -65,11 +65,17 @@ def preprocess(scan: SemanticScan, config: SgorConfig | None = None, *,
         cloud = voxel_grid(points, labels, config.voxel_size)
     with clock('ground'):
         ground = segment_ground(cloud, convention.ground, config)
-        keep = _matchable(cloud, ground, convention, config)
+        if ground is not None and config.correspondence_preprocessing:
+            cloud = cloud[~ground.mask]
+    with clock('votes'):
+        neighbours = radius_neighbours(cloud.points, config.vote_radius)
+        regional = regional_labels(cloud, neighbours, config.vote_radius)
+        keep = ~np.isin(regional, _unmatched_classes(convention, config))
+        cloud, regional = cloud[keep], regional[keep]
     if keypoints is None and descriptors is None:
-        features = _describe(cloud[keep], config, clock)
+        features = _describe(cloud, regional, config, clock)
     else:
-        features = _given(keypoints, descriptors, cloud, keep, config)
+        features = _given(keypoints, descriptors, cloud, regional, config)
     if ground is None:
         warnings.append('no ground plane found: no ground check')
     else:
@@ -105,25 +111,17 @@ def _usable(scan: SemanticScan, convention: LabelConvention, config: SgorConfig
     return scan.points[keep], labels[keep], warnings
 
 
-def _matchable(cloud: VoxelCloud, ground: Ground | None, convention: LabelConvention,
-               config: SgorConfig) -> NDArray[np.bool_]:
-    """Return which voxels take part in matching."""
-    keep = np.ones(len(cloud.points), np.bool_)
-    if config.correspondence_preprocessing:
-        if ground is not None:
-            keep &= ~ground.mask
-        if config.drop_ground_labels:
-            keep &= ~np.isin(cloud.labels, list(convention.ground))
-    if not config.moving_vote:
-        keep &= ~np.isin(cloud.labels, list(convention.movable))
-    return keep
+def _unmatched_classes(convention: LabelConvention, config: SgorConfig) -> list[int]:
+    """Return the regional labels that take no part in matching."""
+    ground = (convention.ground if config.correspondence_preprocessing
+              and config.drop_ground_labels else frozenset())
+    return sorted(ground if config.moving_vote else ground | convention.movable)
 
 
-def _describe(cloud: VoxelCloud, config: SgorConfig, clock: Stopwatch) -> Features:
+def _describe(cloud: VoxelCloud, regional: NDArray[np.uint8], config: SgorConfig,
+              clock: Stopwatch) -> Features:
     with clock('neighbours'):
         neighbours = radius_neighbours(cloud.points, config.descriptor_radius)
-    with clock('votes'):
-        regional = regional_labels(cloud, neighbours, config.vote_radius)
     with clock('normals'):
         directions = normals(cloud.points, neighbours, config.normal_radius)
     with clock('descriptors'):
@@ -142,8 +140,11 @@ def _over_ground(features: Features, ground: Ground, convention: LabelConvention
 
 
 def _given(keypoints: ArrayLike | None, descriptors: ArrayLike | None, cloud: VoxelCloud,
-           keep: NDArray[np.bool_], config: SgorConfig) -> Features:
-    """Give the caller's keypoints the labels of the nearest voxel; drop those on the ground."""
+           regional: NDArray[np.uint8], config: SgorConfig) -> Features:
+    """Give the caller's keypoints the labels of the nearest voxel; drop those without one near.
+
+    Those are on the ground, out of range or on something that moves.
+    """
     if keypoints is None or descriptors is None:
         raise InputError('keypoints and descriptors: give both or none')
     points = finite_points(keypoints, 'keypoints')
@@ -151,10 +152,8 @@ def _given(keypoints: ArrayLike | None, descriptors: ArrayLike | None, cloud: Vo
     if described.ndim != 2 or len(described) != len(points):
         raise InputError(f'descriptors: expected one row a keypoint, ({len(points)}, D), '
                          f'got shape {described.shape}')
-    neighbours = radius_neighbours(cloud.points, config.vote_radius)
-    regional = regional_labels(cloud, neighbours, config.vote_radius)
-    nearest = cKDTree(cloud.points).query(points, workers=config.threads)[1]
-    rows = np.flatnonzero(keep[nearest])
+    distance, nearest = cKDTree(cloud.points).query(points, workers=config.threads)
+    rows = np.flatnonzero(distance <= config.voxel_size)
     nearest = nearest[rows]
     return Features(points[rows], cloud.labels[nearest], regional[nearest],
                     unit_rows(described[rows]))

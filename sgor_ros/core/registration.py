@@ -31,6 +31,10 @@ from .verification import Normals
 from .verification import verify
 
 
+FEW_INLIERS = 50
+"""With fewer the fit is off by decimetres at the far end of a scan."""
+
+
 def register(source: SemanticScan | PreparedScan, target: SemanticScan | PreparedScan,
              config: SgorConfig | None = None) -> Registration:
     """Find the transformation between two overlapping scans, without an initial guess.
@@ -94,7 +98,8 @@ def _locally(result: Registration, source: PreparedScan, target: PreparedScan,
     if not result.success or result.T_target_source is None:
         return result
     if source.surface is not None and target.surface is not None:
-        local = align(source.surface, target.surface, result.T_target_source, config)
+        local = align(source.surface, target.surface, result.T_target_source,
+                      result.inliers.sum() < FEW_INLIERS, config)
         agree = distances(local.T_target_source, result.source_points,
                           result.target_points) < config.tau_1
         result = replace(result, T_target_source=local.T_target_source,
