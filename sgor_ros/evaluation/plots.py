@@ -1,9 +1,14 @@
 """Pictures of what was measured."""
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Literal
 
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
+from matplotlib.ticker import FormatStrFormatter
+from matplotlib.ticker import LogLocator
+from matplotlib.ticker import NullFormatter
 import numpy as np
 
 from .report import at_threshold
@@ -42,14 +47,24 @@ def plot_pairs(path: Path, rows: Sequence[Row], methods: Sequence[str]) -> None:
 def _boxes(axes: Axes, values: dict[str, list[float]], label: str) -> None:
     names = list(values)[::-1]
     boxes = axes.boxplot([values[name] for name in names], vert=False, whis=(5, 95),
-                         showfliers=False, patch_artist=True, tick_labels=names, widths=0.6)
+                         showfliers=False, patch_artist=True, widths=0.6)
+    axes.set_yticklabels(names)
     for index, box in enumerate(boxes['boxes']):
         box.set_facecolor(f'C{len(names) - 1 - index}')
     for median in boxes['medians']:
         median.set_color('black')
-    axes.set_xscale('log')
+    _logarithmic(axes, 'x')
     axes.set_title(f'{label}: median, quartiles, 5 and 95 %', fontsize=10, loc='left')
     axes.grid(alpha=0.25, axis='x', which='both')
+
+
+def _logarithmic(axes: Axes, which: Literal['x', 'y']) -> None:
+    """Make an axis logarithmic, with plain numbers at 1, 2 and 5 of each decade."""
+    axes.set(**{f'{which}scale': 'log'})
+    axis: Axis = axes.xaxis if which == 'x' else axes.yaxis
+    axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    axis.set_major_formatter(FormatStrFormatter('%g'))
+    axis.set_minor_formatter(NullFormatter())
 
 
 def plot_confidence(path: Path, rows: Sequence[Row], default: float) -> None:
@@ -114,7 +129,8 @@ def plot_sequences(path: Path, tracks: Sequence[Track]) -> None:
             error.plot(100 * off, lw=1.4, label=track.method)
             slow.plot(np.arange(SETTLED, len(off)), 1e3 * track.seconds[SETTLED:], lw=1,
                       label=track.method)
-        above.set(xlabel='x [m]', ylabel='y [m]', aspect='equal')
+        above.set(xlabel='x [m]', ylabel='y [m]')
+        above.set_aspect('equal', adjustable='datalim')
         above.set_title(drive, loc='left', weight='bold')
         error.set(xlabel='scan', ylabel='off the truth [cm]', ylim=(0, None))
         slow.set(xlabel='scan', ylabel='time [ms]', ylim=(0, None))
@@ -135,7 +151,9 @@ def plot_solver(path: Path, rows: Sequence[Solved]) -> None:
             if own:
                 axes.plot(*zip(*own, strict=True), style, color=f'C{index}', ms=7,
                           label=solver if made_up else f'{solver}, real matches')
-    axes.set(xscale='log', yscale='log', xlabel='correspondences', ylabel='time [ms]')
+    _logarithmic(axes, 'x')
+    _logarithmic(axes, 'y')
+    axes.set(xlabel='correspondences', ylabel='time [ms]')
     axes.grid(alpha=0.25, which='both')
     axes.legend()
     figure.savefig(path, dpi=DPI)

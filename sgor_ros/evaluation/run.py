@@ -117,8 +117,10 @@ def _sgor(sample: Sample, config: SgorConfig, label_noise: float, *, labels: boo
                         config.replace(label_convention=sample.source_convention))
     result = register(source, target, config)
     end = time.perf_counter()
-    return Answer(result.T_target_source, end - begin, result.success, result.confidence,
-                  end - one_ready)
+    # what was refused for another reason has no threshold that would let it pass
+    other_reason = not result.success and result.confidence >= config.min_confidence
+    return Answer(result.T_target_source, end - begin, result.success,
+                  0.0 if other_reason else result.confidence, end - one_ready)
 
 
 def _spoiled(labels: NDArray[np.int64] | None, share: float, rng: np.random.Generator

@@ -98,6 +98,7 @@ def run_solver(sets: Sequence[Matches], config: SgorConfig, runs: int) -> list[S
 def run_dense(sets: Sequence[Matches], dense: Dense) -> list[Solved]:
     """Time the dense reference and the sparse path in the same settings, once each."""
     config = SgorConfig.paper().replace(groups=DENSE_GROUPS)
+    _solve(sets[0], config)
     solvers: dict[str, Callable[[Matches], Any]] = {
         f'dense numpy, {DENSE_GROUPS} groups': lambda m: dense(
             m.source, m.target, config.sigma_d, config.weight_cutoff, config.groups,
