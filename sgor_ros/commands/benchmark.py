@@ -1,8 +1,5 @@
 """`sgor_benchmark`: SGOR and its rivals on the same scans in the same run."""
-from argparse import ArgumentParser
-from argparse import ArgumentTypeError
 from argparse import Namespace
-from collections.abc import Callable
 from collections.abc import Iterator
 from collections.abc import Sequence
 from contextlib import contextmanager
@@ -27,7 +24,7 @@ from ..evaluation.pairs import Drive
 from ..evaluation.pairs import Pair
 from ..evaluation.run import Method
 from ..evaluation.run import sgor
-from .options import parser
+from .benchmark_options import benchmark_parser
 from .options import run
 
 WORLD_SEEDS = (0, 1)
@@ -50,9 +47,9 @@ DENSE_REFERENCE = Path(__file__).parents[2] / 'test/dense_reference.py'
 
 def main(argv: list[str] | None = None) -> int:
     """Run the command and return its exit code."""
-    arguments = _parser().parse_args(argv)
+    arguments = benchmark_parser().parse_args(argv)
     with _cores(arguments.cores):
-        return run(arguments.command, arguments)
+        return run(COMMANDS[arguments.command], arguments)
 
 
 def pairs(arguments: Namespace) -> int:
@@ -127,7 +124,7 @@ def sequence(arguments: Namespace) -> int:
     if _wants_world(arguments):
         drives.append(_world(arguments.seed, arguments.scans, arguments.speed))
     if not drives:
-        raise InputError(f'{arguments.data}: no drive with poses.txt and at least two scans')
+        raise InputError(f'{arguments.data}: no drive with two scans and poses.txt, good in z')
     makers = sequences.odometries(config, _say)
     tracks = [track for drive in drives for track in sequences.run_drive(drive, makers, config)]
     _finish(arguments, report.sequence_table(tracks), report.scan_records(tracks), 0, 0)
@@ -153,74 +150,8 @@ def solve(arguments: Namespace) -> int:
     return 0
 
 
-def _parser() -> ArgumentParser:
-    top = parser('Measure SGOR and its rivals on your own data or on the built-in world. Each '
-                 'command prints a table and writes table.md, rows.csv, run.json and a plot.')
-    commands = top.add_subparsers(required=True, metavar='COMMAND')
-    one = _add(commands, pairs, 'pairs', 'registration of pairs: recall, errors, time, memory, '
-               'false accepts')
-    one.add_argument('--methods', nargs='+', metavar='NAME', help='of sgor, paper, '
-                     'kiss-matcher-0.3, kiss-matcher-0.5, ransac, fgr; default: all installed')
-    one.add_argument('--label-noise', type=_share, metavar='SHARE',
-                     help='also run SGOR with this share of all labels random')
-    one.add_argument('--no-labels', action='store_true', help='also run SGOR without labels')
-    one.add_argument('--wrong', type=int, default=50, help='pairs of different places, to see '
-                     'what is accepted of them')
-    two = _add(commands, wrong, 'wrong', 'how far confidence tells wrong pairs from right ones')
-    two.add_argument('--count', type=int, default=500, help='wrong pairs')
-    for command in (one, two):
-        command.add_argument('--limit', type=_positive, default=300, help='right pairs, chosen at '
-                             'random and evenly over the data sets')
-    three = _add(commands, ablation, 'ablation', 'every mechanism off, one at a time')
-    three.add_argument('--pairs', type=_positive, default=200, help='right pairs, likewise')
-    for command in (one, two, three):
-        command.add_argument('--max-distance', type=float, default=36.0, metavar='M',
-                             help='between the sensors of a right pair')
-    four = _add(commands, sequence, 'sequence', 'odometry: drift and time a scan')
-    four.add_argument('--scans', type=_positive, default=120, help='of each drive')
-    four.add_argument('--speed', type=float, default=6.0, metavar='M/S', help='in the world')
-    five = _add(commands, solve, 'solver', 'time of the solver against the count of matches')
-    five.add_argument('--counts', type=_positive, nargs='+',
-                      default=[500, 1000, 2000, 4000, 8000, 20000])
-    five.add_argument('--inlier-share', type=_share, default=0.02, help='of made-up matches')
-    five.add_argument('--runs', type=_positive, default=20, help='for each time')
-    five.add_argument('--dense-limit', type=int, default=2000,
-                      help='most matches for the dense reference')
-    return top
-
-
-def _add(commands: Any, function: Callable[[Namespace], int], name: str, what: str
-         ) -> ArgumentParser:
-    formatter = parser('').formatter_class
-    command: ArgumentParser = commands.add_parser(name, help=what, description=what,
-                                                  formatter_class=formatter)
-    command.set_defaults(command=function)
-    command.add_argument('--data', type=Path, metavar='FOLDER', help='with folders velodyne, '
-                         'labels and poses.txt, itself or up to two levels below, as in '
-                         'SemanticKITTI; each drive a place of its own')
-    command.add_argument('--world', action='store_true', help='use the built-in world; default '
-                         'where there is no --data')
-    command.add_argument('--seed', type=int, default=0)
-    command.add_argument('--cores', type=_positive, default=2, help='of the processor, for all')
-    command.add_argument('--output', type=Path, default=Path('out/benchmark') / name,
-                         metavar='FOLDER')
-    return command
-
-
-def _positive(text: str) -> int:
-    if not text.isdecimal() or int(text) < 1:
-        raise ArgumentTypeError(f'{text!r}: expected a whole number from 1')
-    return int(text)
-
-
-def _share(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = -1.0
-    if not 0 <= value <= 1:
-        raise ArgumentTypeError(f'{text!r}: expected a number from 0 to 1')
-    return value
+COMMANDS = {'pairs': pairs, 'wrong': wrong, 'ablation': ablation, 'sequence': sequence,
+            'solver': solve}
 
 
 @contextmanager
@@ -289,8 +220,8 @@ def _right_pairs(arguments: Namespace, drives: Sequence[Drive], count: int) -> l
     if arguments.data:
         candidates += pairing.listed_pairs(arguments.data, arguments.max_distance)
     if not candidates:
-        raise InputError(f'{arguments.data}: no pairs within {arguments.max_distance:g} m; they '
-                         'need poses.txt or pairs.json')
+        raise InputError(f'{arguments.data or "world"}: no pairs within '
+                         f'{arguments.max_distance:g} m; they need poses.txt or pairs.json')
     return pairing.choose(candidates, count, arguments.seed)
 
 
@@ -314,9 +245,8 @@ def _name(change: dict[str, Any]) -> str:
 def _finish(arguments: Namespace, text: str, records: list[dict[str, Any]], right: int,
             wrong: int) -> None:
     print(text)
-    options = {name: value for name, value in vars(arguments).items() if name != 'command'}
     report.save(arguments.output, text, records, {
-        'options': options, 'right_pairs': right, 'wrong_pairs': wrong,
+        'options': vars(arguments), 'right_pairs': right, 'wrong_pairs': wrong,
         'config': asdict(_config(arguments))})
     _say(f'wrote {arguments.output}')
 
