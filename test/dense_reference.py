@@ -36,7 +36,7 @@ def group_matrix(group, consistent, weights, tight, loose):
     return semantic * global_aware
 
 
-def leading_eigenvector(matrix, rounds=20):
+def leading_eigenvector(matrix, rounds=10):
     """Return the vector of `rounds` power iterations from ones, (N,)."""
     vector = np.ones(len(matrix))
     for _ in range(rounds):

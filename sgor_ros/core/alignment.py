@@ -40,14 +40,14 @@ class Alignment:
     pairs: int
 
 
-def surface(points: NDArray[np.float32], voxel_size: float, threads: int) -> Surface | None:
-    """Thin (N, 3) points and estimate local covariances; None with too few points for them."""
+def surface(points: NDArray[np.float64], threads: int) -> Surface | None:
+    """Estimate local covariances of (V, 3) thinned points; None with too few for them."""
     if len(points) < NEIGHBOURS:
         return None
-    cloud, tree = small_gicp.preprocess_points(
-        points.astype(np.float64), downsampling_resolution=voxel_size,
-        num_neighbors=NEIGHBOURS, num_threads=threads)
-    return Surface(cloud, tree) if cloud.size() >= NEIGHBOURS else None
+    cloud = small_gicp.PointCloud(points)
+    tree = small_gicp.KdTree(cloud, num_threads=threads)
+    small_gicp.estimate_covariances(cloud, tree, num_neighbors=NEIGHBOURS, num_threads=threads)
+    return Surface(cloud, tree)
 
 
 def align(source: Surface, target: Surface, T_target_source: NDArray[np.float64], rough: bool,

@@ -107,8 +107,6 @@ class SgorConfig(Settings):
     # local refinement on the clouds and acceptance (beyond the paper)
     local_refinement: bool = setting(
         True, 'Refine on the clouds by GICP, from which a covariance follows')
-    local_voxel_size: float = setting(
-        0.4, 'Voxel grid of the local refinement', 'm', minimum=0.01, maximum=5.0)
     local_reach: float = setting(
         0.5, 'Farthest pair of points that the local refinement uses', 'm',
         minimum=0.02, maximum=10.0)
@@ -144,7 +142,7 @@ class SgorConfig(Settings):
         return cls(min_range=0.0, max_range=20.0, voxel_size=0.05, sigma_g=0.03,
                    normal_radius=0.10, descriptor_radius=0.25, vote_radius=0.10, context_scale=0.15,
                    height_gate=0.0, key_spacing=0.1, sigma_d=0.10, tau_1=0.10,
-                   ground_check=False, local_voxel_size=0.03, local_reach=0.10,
+                   ground_check=False, local_reach=0.10,
                    evidence_reach=0.10)
 
     @classmethod

@@ -50,42 +50,45 @@ def semantic_context(points: NDArray[np.float64], labels: NDArray[np.uint8], gro
     cell = config.context_scale / 1.5
     across = np.linalg.svd(ground.normal[None])[2][1:]    # two axes in the ground plane
     reach = math.ceil(TRUNCATE * config.context_scale * 2**(OCTAVES - 1) / cell)
-    cells = np.floor(points @ across.T / cell).astype(np.int64)
-    cells += reach - cells.min(axis=0, initial=0)
-    column = np.full(256, -1, np.int64)
+    xy = np.floor(points @ across.T / cell).astype(np.int64)
+    xy += reach - xy.min(axis=0, initial=0)
+    shape = xy.max(axis=0, initial=0) + reach + 1
     present = [c for c in classes if (labels == c).any()]
+    column = np.full(256, -1, np.int64)
     column[present] = np.arange(len(present))
-    mapped = column[labels]
-    occupied = np.zeros((*(cells.max(axis=0, initial=0) + reach + 1), len(present)), np.float32)
-    seen = mapped >= 0
-    occupied[cells[seen, 0], cells[seen, 1], mapped[seen]] = 1.0
-    full = np.zeros((len(points), OCTAVES, len(classes)), np.float32)
+    places, of_point = np.unique(xy[:, 0] * shape[1] + xy[:, 1], return_inverse=True)
+    occupied = np.zeros((len(places), len(present)), np.bool_)
+    seen = column[labels] >= 0
+    occupied[of_point[seen], column[labels[seen]]] = True
+    context = np.zeros((len(places), OCTAVES, len(classes)), np.float32)
     columns = [classes.index(c) for c in present]
     for octave in range(OCTAVES):
         sigma = config.context_scale * 2**octave / cell
         taps = np.arange(-math.ceil(TRUNCATE * sigma), math.ceil(TRUNCATE * sigma) + 1)
         kernel = np.exp(-0.5 * (taps / sigma)**2).astype(np.float32)
         kernel *= np.sqrt(sigma) / kernel.sum()    # far scales are thinner: keep their say
-        full[:, octave, columns] = _blurred_at(occupied, kernel, cells)
-    flat = np.sqrt(full.reshape(len(points), -1))
+        context[:, octave, columns] = _blur(places // shape[1], places % shape[1], occupied,
+                                            kernel, shape[0], shape[1])
+    flat = np.sqrt(context.reshape(len(places), -1))
     length = np.linalg.norm(flat, axis=1, keepdims=True)
-    return np.divide(flat, length, out=np.zeros_like(flat), where=length > 0)
+    unit = np.divide(flat, length, out=np.zeros_like(flat), where=length > 0)
+    return unit[of_point]
 
 
 @numba.njit(cache=True, nogil=True, parallel=True, fastmath=True)
-def _blurred_at(occupied, kernel, cells):  # type: ignore[no-untyped-def]
-    """Blur along one axis everywhere, along the other only where it is asked for."""
-    nx, ny, nc = occupied.shape
+def _blur(x, y, occupied, kernel, nx, ny):  # type: ignore[no-untyped-def]
+    """Blur maps that are given, and wanted, at some places only: (P, C)."""
+    n_places, n_classes = occupied.shape
     half = len(kernel) // 2
-    rows = np.zeros((nx, ny, nc), np.float32)
-    for x in numba.prange(half, nx - half):
+    rows = np.zeros((nx, ny, n_classes), np.float32)
+    for i in range(n_places):
+        for c in range(n_classes):
+            if occupied[i, c]:
+                for t in range(len(kernel)):
+                    rows[x[i] + t - half, y[i], c] += kernel[t]
+    out = np.zeros((n_places, n_classes), np.float32)
+    for i in numba.prange(n_places):
         for t in range(len(kernel)):
-            for y in range(ny):
-                for c in range(nc):
-                    rows[x, y, c] += kernel[t] * occupied[x + t - half, y, c]
-    out = np.zeros((len(cells), nc), np.float32)
-    for i in numba.prange(len(cells)):
-        for t in range(len(kernel)):
-            for c in range(nc):
-                out[i, c] += kernel[t] * rows[cells[i, 0], cells[i, 1] + t - half, c]
+            for c in range(n_classes):
+                out[i, c] += kernel[t] * rows[x[i], y[i] + t - half, c]
     return out

@@ -101,9 +101,11 @@ def given_correspondences(source_points: ArrayLike, target_points: ArrayLike,
 
 def overlap_region(source: Features, target: Features) -> tuple[Features, Features]:
     """Keep the classes that both scans have (Eq. 4); unlabelled points stay."""
-    shared = np.intersect1d(source.labels, target.labels)
-    shared = np.append(shared, UNLABELLED)
-    return source[np.isin(source.labels, shared)], target[np.isin(target.labels, shared)]
+    shared = (np.bincount(source.labels, minlength=256) > 0)
+    shared &= (np.bincount(target.labels, minlength=256) > 0)
+    shared[UNLABELLED] = True
+    p, q = shared[source.labels], shared[target.labels]
+    return source if p.all() else source[p], target if q.all() else target[q]
 
 
 def match(source: Features, target: Features, config: SgorConfig) -> Correspondences:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import se3
+from .angles import atan2
 from .correspondences import Features
 
 AZIMUTHS, ELEVATIONS = 360, 180
@@ -133,10 +134,10 @@ def _hash_points(points, cell):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True, inline='always')
-def _direction(x, y, z, r):  # type: ignore[no-untyped-def]
-    azimuth = int((math.atan2(y, x) / (2 * math.pi) + 0.5) * AZIMUTHS)
-    elevation = int((math.asin(min(max(z / r, -1.0), 1.0)) / math.pi + 0.5) * ELEVATIONS)
-    return min(azimuth, AZIMUTHS - 1), min(elevation, ELEVATIONS - 1)
+def _direction(x, y, z):  # type: ignore[no-untyped-def]
+    azimuth = int((atan2(y, x) / (2 * math.pi) + 0.5) * AZIMUTHS)
+    elevation = int((atan2(z, math.sqrt(x * x + y * y)) / math.pi + 0.5) * ELEVATIONS)
+    return min(max(azimuth, 0), AZIMUTHS - 1), min(max(elevation, 0), ELEVATIONS - 1)
 
 
 @numba.njit(cache=True, nogil=True)
@@ -146,7 +147,7 @@ def _range_image(points):  # type: ignore[no-untyped-def]
         x, y, z = points[i]
         r = math.sqrt(x * x + y * y + z * z)
         if r > 0:
-            a, e = _direction(x, y, z, r)
+            a, e = _direction(x, y, z)
             nearest[a, e] = min(nearest[a, e], r)
     return nearest
 
@@ -172,7 +173,7 @@ def _shares(points, labels, T, others, other_labels, cell, slots, chain, nearest
         elif not near:
             r = math.sqrt(x * x + y * y + z * z)
             if r > 0:
-                a, e = _direction(x, y, z, r)
+                a, e = _direction(np.float32(x), np.float32(y), np.float32(z))
                 # nothing measured there is no evidence
                 if nearest[a, e] < np.inf and r < nearest[a, e] * (1 - MARGIN_SHARE) - MARGIN:
                     outcome[h, i] = 2

@@ -9,6 +9,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from .angles import atan2
 from .neighbours import Neighbours
 from .voxels import winning_labels
 from .voxels import VoxelCloud
@@ -155,24 +156,8 @@ def _across(a, xy, xz, b, yz, c):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True, inline='always')
 def _angle_bin(y, x):  # type: ignore[no-untyped-def]
-    """Return floor(11 (atan2(y, x) + pi) / 2 pi) by a polynomial good to 1e-6 rad."""
-    ax = abs(x)
-    ay = abs(y)
-    small = min(ax, ay)
-    large = max(max(ax, ay), np.float32(1e-30))
-    t = small / large
-    s = t * t
-    a = np.float32(-0.0117212)
-    a = a * s + np.float32(0.05265332)
-    a = a * s + np.float32(-0.11643287)
-    a = a * s + np.float32(0.19354346)
-    a = a * s + np.float32(-0.33262347)
-    a = a * s + np.float32(0.99997726)
-    a = a * t
-    a = np.float32(math.pi / 2) - a if ay > ax else a
-    a = np.float32(math.pi) - a if x < 0 else a
-    a = -a if y < 0 else a
-    return np.int32((a + np.float32(math.pi)) * np.float32(BINS / (2 * math.pi)))
+    """Return floor(11 (atan2(y, x) + pi) / 2 pi)."""
+    return np.int32((atan2(y, x) + np.float32(math.pi)) * np.float32(BINS / (2 * math.pi)))
 
 
 @numba.njit(cache=True, nogil=True, parallel=True, error_model='numpy',

@@ -63,6 +63,9 @@ def preprocess(scan: SemanticScan, config: SgorConfig | None = None, *,
     with clock('voxel grid'):
         points, labels, warnings = _usable(scan, convention, config)
         cloud = voxel_grid(points, labels, config.voxel_size)
+    with clock('surface'):
+        fixed = config.moving_vote | ~np.isin(cloud.labels, list(convention.movable))
+        local = surface(cloud.points[fixed], config.threads) if config.local_refinement else None
     with clock('ground'):
         ground = segment_ground(cloud, convention.ground, config)
         if ground is not None and config.correspondence_preprocessing:
@@ -85,13 +88,7 @@ def preprocess(scan: SemanticScan, config: SgorConfig | None = None, *,
             warnings.append('no ground labels: ground plane found by geometry')
     with clock('view'):
         sight = view(points, features, 2 * config.evidence_reach)
-    with clock('surface'):
-        fixed = (slice(None) if config.moving_vote
-                 else ~np.isin(labels, list(convention.movable)))
-        near_surface = (surface(points[fixed], config.local_voxel_size, config.threads)
-                        if config.local_refinement else None)
-    return PreparedScan(scan, config, features, ground, sight, near_surface, tuple(warnings),
-                        clock.seconds)
+    return PreparedScan(scan, config, features, ground, sight, local, tuple(warnings), clock.seconds)
 
 
 def _usable(scan: SemanticScan, convention: LabelConvention, config: SgorConfig
