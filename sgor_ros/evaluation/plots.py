@@ -34,27 +34,29 @@ def plot_pairs(path: Path, rows: Sequence[Row], methods: Sequence[str]) -> None:
                  'o-', color=f'C{index}', label=name, lw=1.6, ms=5)
     top.set(xlabel='distance of the sensors [m]', ylabel='recall [%]', ylim=(-3, 103))
     top.legend(fontsize=8)
-    _boxes(slow, {name: [1e3 * row.seconds for row in own] for name, own in right.items()},
+    _spread(slow, {name: [1e3 * row.seconds for row in own] for name, own in right.items()},
            'two raw scans to transform [ms]')
-    _boxes(turned, {name: [row.rotation_error_deg for row in own if row.success]
+    _spread(turned, {name: [row.rotation_error_deg for row in own if row.success]
                     for name, own in right.items()}, 'RE of successes [deg]')
-    _boxes(moved, {name: [100 * row.translation_error_m for row in own if row.success]
+    _spread(moved, {name: [100 * row.translation_error_m for row in own if row.success]
                    for name, own in right.items()}, 'TE of successes [cm]')
     top.grid(alpha=0.25)
     figure.savefig(path, dpi=DPI)
 
 
-def _boxes(axes: Axes, values: dict[str, list[float]], label: str) -> None:
-    names = list(values)[::-1]
-    boxes = axes.boxplot([values[name] for name in names], vert=False, whis=(5, 95),
-                         showfliers=False, patch_artist=True, widths=0.6)
-    axes.set_yticklabels(names)
-    for index, box in enumerate(boxes['boxes']):
-        box.set_facecolor(f'C{len(names) - 1 - index}')
-    for median in boxes['medians']:
-        median.set_color('black')
+def _spread(axes: Axes, values: dict[str, list[float]], label: str) -> None:
+    """Draw for each name the median, the quartiles, and 5 to 95 %."""
+    for index, (name, own) in enumerate(values.items()):
+        if own:
+            low, first, median, third, high = np.percentile(own, (5, 25, 50, 75, 95))
+            axes.hlines(name, low, high, color=f'C{index}', lw=2)
+            axes.hlines(name, first, third, color=f'C{index}', lw=11, alpha=0.6)
+            axes.plot(median, name, '|', color='black', ms=14, mew=2)
+        else:
+            axes.plot(np.nan, name)    # keeps its line
+    axes.invert_yaxis()
     _logarithmic(axes, 'x')
-    axes.set_title(f'{label}: median, quartiles, 5 and 95 %', fontsize=10, loc='left')
+    axes.set_title(f'{label}: median, quartiles, 5 to 95 %', fontsize=10, loc='left')
     axes.grid(alpha=0.25, axis='x', which='both')
 
 
