@@ -5,6 +5,24 @@ from .config import SgorConfig
 from .evidence import evidence
 from .evidence import View
 from .scan import Registration
+from .verification import near_counts
+
+
+def judge_matches(result: Registration, config: SgorConfig) -> Registration:
+    """Add a confidence to a candidate from matches alone, for which there are no clouds.
+
+    It weighs the inliers against the most matches outside them that any one other hypothesis of
+    the groups explains: wrong transformations have rivals as strong as themselves, 0.5. Structured
+    wrong matches can still reach 0.6, so nothing is refused by it.
+    """
+    if result.T_target_source is None:
+        return result
+    outside = ~result.inliers
+    explained = near_counts(result.hypotheses, result.source_points[outside],
+                            result.target_points[outside], config.tau_1)
+    count, rival = int(result.inliers.sum()), int(explained.max(initial=0))
+    return replace(result, confidence=count / max(count + rival, 1),
+                   evidence={'inliers': count, 'rival': rival})
 
 
 def judge(result: Registration, source: View, target: View, reach: float,

@@ -69,7 +69,7 @@ def semantic_context(points: NDArray[np.float64], labels: NDArray[np.uint8], gro
         kernel *= np.sqrt(sigma) / kernel.sum()    # far scales are thinner: keep their say
         context[:, octave, columns] = _blur(places // shape[1], places % shape[1], occupied,
                                             kernel, shape[0], shape[1])
-    flat = np.sqrt(context.reshape(len(places), -1))
+    flat = np.sqrt(context.reshape(len(places), OCTAVES * len(classes)))
     length = np.linalg.norm(flat, axis=1, keepdims=True)
     unit = np.divide(flat, length, out=np.zeros_like(flat), where=length > 0)
     return unit[of_point]

@@ -114,7 +114,11 @@ def label_convention(name: str) -> LabelConvention:
 
 def _parse(name: str, table: dict[str, Any]) -> LabelConvention:
     classes = {int(k): int(v) for k, v in table['classes'].items()}
-    if not all(0 <= c <= 255 for c in classes.values()) or not all(0 <= k < 2**16 for k in classes):
+    drop = frozenset(int(i) for i in table.get('drop', ()))
+    if not classes:
+        raise ValueError('no classes')
+    if not (all(0 <= c <= 255 for c in classes.values())
+            and all(0 <= i < 2**16 for i in (*classes, *drop))):
         raise ValueError('ids must be in 0 to 65535 and classes in 0 to 255')
     mask = int(table.get('mask', 0xFFFFFFFF))
     if mask < 0:
@@ -124,4 +128,4 @@ def _parse(name: str, table: dict[str, Any]) -> LabelConvention:
         names={int(k): str(v) for k, v in table['names'].items()},
         ground=frozenset(int(c) for c in table['ground']),
         movable=frozenset(int(c) for c in table.get('movable', ())),
-        drop=frozenset(int(i) for i in table.get('drop', ())))
+        drop=drop)

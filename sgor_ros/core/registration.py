@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .acceptance import judge
+from .acceptance import judge_matches
 from .alignment import align
 from .config import SgorConfig
 from .consistency import consistency_graph
@@ -134,7 +135,8 @@ def register_correspondences(source_points: ArrayLike, target_points: ArrayLike,
     clock = Stopwatch()
     correspondences = given_correspondences(source_points, target_points, source_labels,
                                             target_labels, config)
-    return solve(correspondences, ground_normals, None, config, clock)
+    result = solve(correspondences, ground_normals, None, config, clock)
+    return judge_matches(result, config)
 
 
 def solve(correspondences: Correspondences, ground_normals: Normals | None,

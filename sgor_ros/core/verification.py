@@ -89,3 +89,18 @@ def truncated_distance(T, source, target, sigma_d):  # type: ignore[no-untyped-d
             total += min(max(np.sqrt(squared), 0.5 * sigma_d), 2.5 * sigma_d)
         cost[h] = total / len(source)
     return cost
+
+
+@numba.njit(cache=True, nogil=True, parallel=True, fastmath=True)
+def near_counts(T, source, target, reach):  # type: ignore[no-untyped-def]
+    """Return how many of (N, 3) matches lie within `reach` metres for each of (H, 4, 4)."""
+    counts = np.zeros(len(T), np.int64)
+    for h in numba.prange(len(T)):
+        for i in range(len(source)):
+            squared = 0.0
+            for a in range(3):
+                gap = (T[h, a, 0] * source[i, 0] + T[h, a, 1] * source[i, 1]
+                       + T[h, a, 2] * source[i, 2] + T[h, a, 3] - target[i, a])
+                squared += gap * gap
+            counts[h] += squared < reach * reach
+    return counts
