@@ -1,0 +1,190 @@
+"""Label conventions: what the ids of a scan mean, whoever wrote them."""
+import numpy as np
+import pytest
+import yaml
+
+from sgor_ros import InputError
+from sgor_ros import preprocess
+from sgor_ros import SemanticScan
+from sgor_ros import SgorConfig
+from sgor_ros.core.labels import label_convention
+
+CAR, ROAD, BUILDING, VEGETATION, POLE = 1, 9, 13, 15, 18    # classes inside
+CONVENTIONS = ('semantickitti', 'semantickitti_train', 'nuscenes')
+
+
+def decode(name, ids):
+    """Return classes and keep as lists, and the unknown ids."""
+    classes, keep, unknown = label_convention(name).decode(np.array(ids, np.int64))
+    assert classes.dtype == np.uint8
+    return classes.tolist(), keep.tolist(), unknown
+
+
+def test_raw_semantickitti_ids_and_instance_bits():
+    """The class is in the low 16 bits; the instance above does not matter."""
+    ids = [0, 10, 40, 50, 70, 80, 252]
+    plain = decode('semantickitti', ids)
+    assert plain[0] == [0, CAR, ROAD, BUILDING, VEGETATION, POLE, 22]
+    assert plain == decode('semantickitti', [i | (311 << 16) for i in ids])
+    assert plain[2] == []
+
+
+def test_semantickitti_outliers_are_removed():
+    """Id 1 is a wrong measurement, not a thing without a label."""
+    assert decode('semantickitti', [0, 1, 40])[1] == [True, False, True]
+
+
+def test_train_ids_count_from_zero():
+    """0 is a car, 8 the road, 255 unlabelled."""
+    classes, keep, unknown = decode('semantickitti_train', [*range(19), 255])
+    assert classes == [*range(1, 20), 0]
+    assert all(keep)
+    assert unknown == []
+
+
+def test_nuscenes_ego_vehicle_and_movers():
+    """31 is the vehicle itself and goes; 32 to 39 move and belong to no place."""
+    classes, keep, unknown = decode('nuscenes', [17, 24, 28, 30, 31, *range(32, 40)])
+    assert classes[:4] == [CAR, ROAD, BUILDING, VEGETATION]
+    assert keep == [True] * 4 + [False] + [True] * 8
+    assert set(classes[5:]) <= label_convention('nuscenes').movable
+    assert unknown == []
+
+
+@pytest.mark.parametrize(('raw', 'train', 'nuscenes'), [
+    (40, 8, 24), (10, 0, 17), (50, 12, 28), (70, 14, 30), (48, 10, 26), (72, 16, 27)])
+def test_the_same_thing_is_the_same_class_in_all_conventions(raw, train, nuscenes):
+    """So that a scan of one convention meets one of another, with the same name."""
+    found = {decode(name, [i])[0][0] for name, i in (
+        ('semantickitti', raw), ('semantickitti_train', train), ('nuscenes', nuscenes))}
+    assert len(found) == 1
+    names = {label_convention(name).class_name(next(iter(found))) for name in CONVENTIONS}
+    assert len(names) == 1
+
+
+@pytest.mark.parametrize('name', CONVENTIONS)
+def test_every_convention_knows_ground_and_movers(name):
+    """The sets that the method asks for are classes that the convention can give."""
+    convention = label_convention(name)
+    assert ROAD in convention.ground
+    assert not convention.ground & convention.movable
+    assert set(convention.classes.values()) <= set(convention.names)
+    assert convention.ground <= set(convention.names)
+
+
+def test_raw_ids_agree_with_the_table_of_semantickitti(data_folder):
+    """Where the published learning map has a class, it is ours; the rest has classes above 19.
+
+    Moving things have one class of their own: they take no part in registration.
+    """
+    table = yaml.safe_load((data_folder / 'kitti/semantic-kitti.yaml').read_text())
+    convention = label_convention('semantickitti')
+    for raw, expected in table['learning_map'].items():
+        (inside,), (keep,), unknown = decode('semantickitti', [raw])
+        assert unknown == []
+        assert keep == (table['labels'][raw] != 'outlier')
+        if 0 < inside <= 19:
+            assert inside == expected
+            assert convention.class_name(inside) == table['labels'][
+                table['learning_map_inv'][expected]]
+        elif table['labels'][raw].startswith('moving'):
+            assert inside in convention.movable
+        else:
+            assert expected == 0
+    for train, raw in table['learning_map_inv'].items():
+        if train > 0:
+            assert (decode('semantickitti_train', [train - 1])[0]
+                    == decode('semantickitti', [raw])[0])
+
+
+def test_real_labels_hold_nothing_unknown(data_folder):
+    """Hand labels, a network's labels and nuScenes labels, each in its own convention."""
+    for path, dtype, name in (
+            ('kitti/00/labels/000000.label', np.uint32, 'semantickitti'),
+            ('kitti/00/predicted_labels/000000.label', np.uint32, 'semantickitti_train'),
+            ('nuscenes/labels/000000.label', np.uint8, 'nuscenes')):
+        ids = np.fromfile(data_folder / path, dtype).astype(np.int64)
+        classes, _, unknown = label_convention(name).decode(ids)
+        assert unknown == []
+        # road, walls and plants are most of what a street shows
+        assert np.isin(classes, [9, 10, 11, 12, 13, 14, 15, 17]).mean() > 0.6
+
+
+@pytest.mark.parametrize('name', CONVENTIONS)
+@pytest.mark.parametrize('odd', [-1, -40, 199, 65000, 10**9, 2**62 + 199])
+def test_odd_ids_are_unlabelled_and_reported(name, odd):
+    """Negative and huge ids neither fail nor become some class; others are untouched."""
+    known = next(iter(label_convention(name).classes))
+    classes, keep, unknown = decode(name, [known, odd])
+    assert classes[1] == 0
+    assert keep[1]
+    assert len(unknown) == 1
+    assert classes[0] == label_convention(name).classes[known]
+
+
+def test_unknown_ids_are_told_by_preprocess():
+    """The warning names the ids and the convention; the points stay."""
+    rng = np.random.default_rng(0)
+    points = rng.uniform(-20, 20, (500, 3))
+    prepared = preprocess(SemanticScan(points, np.full(500, 77)))
+    assert any('[77]' in w and 'semantickitti' in w for w in prepared.warnings)
+    assert len(prepared.features.points) > 0
+    assert (prepared.features.labels == 0).all()
+
+
+def test_dropped_ids_leave_no_keypoints():
+    """The ego vehicle of nuScenes is out before anything is computed."""
+    rng = np.random.default_rng(0)
+    car = rng.uniform(-2, 2, (400, 3)) + [2, 0, 0]
+    trees = rng.uniform(-3, 3, (400, 3)) + [12, 0, 0]
+    prepared = preprocess(SemanticScan(np.vstack((car, trees)), np.repeat([31, 30], 400)),
+                          SgorConfig(label_convention='nuscenes'))
+    assert prepared.features.points[:, 0].min() > 8.5
+    # nothing was measured nearer than the trees
+    assert prepared.view.nearest.min() > 8.5
+
+
+def test_a_table_of_the_user(tmp_path):
+    """A YAML file by path: its ids, ground, movers and drops are obeyed."""
+    path = tmp_path / 'mine.yaml'
+    path.write_text('mask: 0xFF\nclasses: {3: 9, 4: 13, 5: 6}\nground: [9]\nmovable: [6]\n'
+                    'drop: [7]\nnames: {9: floor, 13: wall, 6: guest}\n')
+    convention = label_convention(str(path))
+    assert decode(str(path), [3, 4, 5, 7, 3 | 0x500]) == (
+        [9, 13, 6, 0, 9], [True, True, True, False, True], [])
+    assert (convention.ground, convention.movable) == ({9}, {6})
+    assert convention.class_name(13) == 'wall'
+    assert decode(str(path), [8])[2] == [8]
+
+
+@pytest.mark.parametrize('text', [
+    '', 'classes: [1, 2', 'classes: {1: 2}', '- 1\n- 2', 'just words',
+    'classes: {1: 300}\nground: []\nnames: {}', 'classes: {-1: 3}\nground: []\nnames: {}',
+    'classes: {a: 3}\nground: []\nnames: {}', 'classes: {1: 3}\nground: 5\nnames: {}',
+    'classes: [3]\nground: []\nnames: {}', 'classes: {1: 3}\nground: []\nnames: [a]',
+    'mask: -1\nclasses: {1: 3}\nground: []\nnames: {}',
+    'classes: {1: 3}\nground: []\nnames: {}\ndrop: [-4]',
+    'classes: {1: 3}\nground: []\nnames: {}\ndrop: [1000000000]',
+    'classes: {}\nground: []\nnames: {}'])
+def test_broken_tables_are_named(tmp_path, text):
+    """Whatever is wrong inside, the error says which file."""
+    path = tmp_path / 'broken.yaml'
+    path.write_text(text)
+    with pytest.raises(InputError, match=r'label_convention = .*broken\.yaml'):
+        label_convention(str(path))
+
+
+def test_a_file_that_is_no_text(tmp_path):
+    path = tmp_path / 'binary.yaml'
+    path.write_bytes(bytes(range(256)))
+    with pytest.raises(InputError, match=r'binary\.yaml'):
+        label_convention(str(path))
+
+
+@pytest.mark.parametrize('name', ['kitti', '', 'nowhere.yaml', 'label'])
+def test_names_that_are_none(name):
+    """The message repeats the name and lists the conventions that there are."""
+    with pytest.raises(InputError) as caught:
+        label_convention(name)
+    assert repr(name) in str(caught.value)
+    assert all(known in str(caught.value) for known in CONVENTIONS)

@@ -1,0 +1,83 @@
+"""The way in: what a scan may be made of, and what is said about the rest."""
+import numpy as np
+import pytest
+
+from sgor_ros import InputError
+from sgor_ros import SemanticScan
+
+NAN = float('nan')
+
+
+def test_lists_are_taken():
+    """Points become float32, labels int64."""
+    scan = SemanticScan([[1, 2, 3], [4, 5, 6.5]], [40, 50])
+    assert len(scan) == 2
+    assert scan.points.dtype == np.float32
+    assert scan.labels.dtype == np.int64
+    np.testing.assert_array_equal(scan.points, [[1, 2, 3], [4, 5, 6.5]])
+    np.testing.assert_array_equal(scan.labels, [40, 50])
+
+
+@pytest.mark.parametrize('dtype', [np.uint8, np.int16, np.uint32, np.int64])
+def test_integers_of_any_width_are_labels(dtype):
+    assert SemanticScan(np.ones((2, 3)), np.array([7, 9], dtype)).labels.tolist() == [7, 9]
+
+
+def test_without_labels():
+    assert SemanticScan(np.ones((2, 3))).labels is None
+
+
+@pytest.mark.parametrize('order', ['C', 'F'])
+@pytest.mark.parametrize('dtype', ['<f4', '>f4', '<f8', '>f8', '<i4'])
+def test_any_number_type_and_memory_layout(dtype, order):
+    """Both endians, both precisions, columns first: the same scan."""
+    points = np.arange(12.0).reshape(4, 3)
+    scan = SemanticScan(np.asarray(points.astype(dtype), order=order))
+    np.testing.assert_array_equal(scan.points, points)
+    assert scan.points.flags.c_contiguous
+    assert scan.points.dtype.isnative
+
+
+@pytest.mark.parametrize('bad', [NAN, float('inf'), -float('inf')])
+def test_rows_that_are_not_finite_go_with_their_labels(bad):
+    """Any of the three coordinates; the labels of the others stay beside their points."""
+    points = np.arange(15.0).reshape(5, 3)
+    points[0, 0], points[2, 1], points[4, 2] = bad, bad, bad
+    scan = SemanticScan(points, [1, 2, 3, 4, 5])
+    np.testing.assert_array_equal(scan.points, [[3, 4, 5], [9, 10, 11]])
+    assert scan.labels.tolist() == [2, 4]
+    assert len(SemanticScan(points)) == 2
+
+
+@pytest.mark.parametrize(('points', 'labels', 'words'), [
+    (np.ones((4, 2)), None, r'points: expected an \(N, 3\) array, got shape \(4, 2\)'),
+    (np.ones((4, 4)), None, r'points: .*\(4, 4\)'),
+    (np.ones(3), None, r'points: .*\(3,\)'),
+    (np.ones((2, 2, 3)), None, r'points: .*\(2, 2, 3\)'),
+    ([], None, r'points: .*\(0,\)'),
+    ('cloud', None, 'points: not an array of numbers'),
+    (None, None, 'points'),
+    ([[1, 2, 3], [4, 5]], None, 'points: not an array of numbers'),
+    ([['a', 'b', 'c']], None, 'points: not an array of numbers'),
+    (np.empty((0, 3)), None, 'points: the scan is empty'),
+    (np.full((7, 3), NAN), None, 'points: none of 7 is finite'),
+    (np.ones((4, 3)), [1, 2, 3], r'labels: expected one a point, \(4,\), got shape \(3,\)'),
+    (np.ones((4, 3)), np.ones((4, 1), int), r'labels: .*\(4, 1\)'),
+    (np.ones((4, 3)), 5, r'labels: .*\(\)'),
+    (np.ones((4, 3)), np.ones(4), 'labels: expected integers, got float64'),
+    (np.ones((4, 3)), np.ones(4, bool), 'labels: expected integers, got bool'),
+    (np.ones((4, 3)), ['a', 'b', 'c', 'd'], 'labels: expected integers'),
+])
+def test_what_is_no_scan_is_refused_by_name(points, labels, words):
+    """The message names the field and what came instead."""
+    with pytest.raises(InputError, match=words):
+        SemanticScan(points, labels)
+
+
+def test_labels_are_checked_against_the_points_as_given():
+    """Not against those that are left when NaN is gone: the caller counts his own."""
+    points = np.ones((3, 3))
+    points[1] = NAN
+    assert SemanticScan(points, [1, 2, 3]).labels.tolist() == [1, 3]
+    with pytest.raises(InputError, match='labels'):
+        SemanticScan(points, [1, 3])
