@@ -145,10 +145,15 @@ def _given(keypoints: ArrayLike | None, descriptors: ArrayLike | None, cloud: Vo
     if keypoints is None or descriptors is None:
         raise InputError('keypoints and descriptors: give both or none')
     points = finite_points(keypoints, 'keypoints')
-    described = np.asarray(descriptors, np.float32)
+    try:
+        described = np.asarray(descriptors, np.float32)
+    except (TypeError, ValueError) as error:
+        raise InputError(f'descriptors: not an array of numbers: {error}') from error
     if described.ndim != 2 or len(described) != len(points):
         raise InputError(f'descriptors: expected one row a keypoint, ({len(points)}, D), '
                          f'got shape {described.shape}')
+    if not np.isfinite(described).all():
+        raise InputError('descriptors: not all are finite')
     distance, nearest = cKDTree(cloud.points).query(points, workers=config.threads)
     rows = np.flatnonzero(distance <= config.voxel_size)
     nearest = nearest[rows]
