@@ -116,7 +116,7 @@ class SgorConfig(Settings):
         0.6, 'Keypoints with one of the same label nearer than this under the result agree', 'm',
         minimum=0.01, maximum=10.0)
     min_confidence: float = setting(
-        0.85, 'Results below this confidence are failures; 0: accept all', minimum=0.0, maximum=1.0)
+        0.88, 'Results below this confidence are failures; 0: accept all', minimum=0.0, maximum=1.0)
 
     threads: int = setting(2, 'Processor cores to use', minimum=1, maximum=64)
 

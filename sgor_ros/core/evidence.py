@@ -17,9 +17,11 @@ from .correspondences import Features
 
 AZIMUTHS, ELEVATIONS = 360, 180
 """Cells of the range image: 1 degree, wider than the gaps between beams."""
-MARGIN, MARGIN_SHARE = 1.0, 0.02
-"""Metres, and share of the range, by which a point must be nearer than all that was seen there:
-edges and grazing rays must not speak against a right transformation."""
+MARGIN_SHARE = 0.02
+"""A point contradicts when it is nearer than all that was seen there by this share of the range
+and one cell of the view: edges and grazing rays must not speak against the right transformation."""
+DOUBT = 0.01
+"""Share of keypoints that speaks against every transformation: a handful alone proves nothing."""
 SAMPLE = 400
 """Keypoints asked for each hypothesis."""
 
@@ -68,7 +70,7 @@ class Evidence:
     @property
     def confidence(self) -> float:
         """The part of those who speak that speak for it, 0 to 1."""
-        return self.agree / max(self.agree + self.contradict, 1e-9)
+        return self.agree / (self.agree + self.contradict + DOUBT)
 
 
 def view(points: NDArray[np.float32], features: Features, cell: float) -> View:
@@ -175,7 +177,7 @@ def _shares(points, labels, T, others, other_labels, cell, slots, chain, nearest
             if r > 0:
                 a, e = _direction(np.float32(x), np.float32(y), np.float32(z))
                 # nothing measured there is no evidence
-                if nearest[a, e] < np.inf and r < nearest[a, e] * (1 - MARGIN_SHARE) - MARGIN:
+                if nearest[a, e] < np.inf and r < nearest[a, e] * (1 - MARGIN_SHARE) - cell:
                     outcome[h, i] = 2
     for h in range(len(T)):
         for i in range(len(points)):
