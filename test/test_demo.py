@@ -7,6 +7,7 @@ import sys
 import numpy as np
 import pytest
 
+from sgor_ros.commands.demo import forth_and_back
 from sgor_ros.core import se3
 from sgor_ros.evaluation.track import track_errors
 
@@ -32,6 +33,11 @@ def test_demo_plays_the_world_and_agrees_with_the_truth(tmp_path):
         width, height = struct.unpack('>II', (tmp_path / 'demo' / name).read_bytes()[16:24])
         assert min(width, height) > 400
     assert 'received 8, processed 8' in (tmp_path / 'demo/node.log').read_text()
+
+
+def test_long_drives_go_forth_and_back_with_stamps_that_go_on():
+    played = list(forth_and_back([10, 13, 16], 7))
+    assert played == [(10, 10), (13, 13), (16, 16), (13, 19), (10, 22), (13, 25), (16, 28)]
 
 
 @pytest.mark.parametrize(('arguments', 'message'), [

@@ -12,6 +12,8 @@ import numpy as np
 import pytest
 import ros_helpers as ros
 
+from sgor_ros.io.messages import matrix_of
+from sgor_ros.ros.player import Domain
 from sgor_ros.world import Lidar
 from sgor_ros.world import simulate
 
@@ -113,7 +115,7 @@ def test_colcon_package_finds_its_own_tables(by_colcon):
 
 
 def test_node_out_of_install_tracks_and_ends_on_interrupt(by_colcon, tmp_path):
-    domain = ros.Domain()
+    domain = Domain()
     environment = {**domain.environment(), 'PYTHONPATH': ''}
     parameters = by_colcon / 'sgor_ros/share/sgor_ros/config/sgor_node.yaml'
     with open(tmp_path / 'log', 'w') as log:
@@ -123,14 +125,15 @@ def test_node_out_of_install_tracks_and_ends_on_interrupt(by_colcon, tmp_path):
             stdout=log, stderr=subprocess.STDOUT, env=environment, cwd=tmp_path)
     partner = ros.Partner(domain)
     try:
-        partner.wait_for_node(240.0)
+        partner.wait_for_node(lambda: node.poll() is None)
         truth = {}
         for seconds, points, labels, pose in simulate(2, lidar=Lidar(beams=32, columns=600)):
-            stamp_ns = partner.send(ros.cloud(points, labels, round(1e9 * (1 + seconds))))
+            stamp_ns = round(1e9 * (1 + seconds))
+            partner.send(stamp_ns, ros.cloud(points, labels, stamp_ns))
             truth[stamp_ns] = pose
             partner.spin_until(lambda: len(partner.odometry) == len(truth), 60.0, 'odometry')
         first, second = truth.values()
-        metres, radians = ros.difference(ros.matrix(partner.odometry[-1].pose.pose),
+        metres, radians = ros.difference(matrix_of(partner.odometry[-1].pose.pose),
                                          np.linalg.inv(first) @ second)
         assert metres < 0.1
         assert radians < 0.01

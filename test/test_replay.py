@@ -74,7 +74,7 @@ def test_summary_and_picture(replayed):
     assert result['topic'] == '/points'
     assert result['restarts'] == [0]
     assert result['parameters']['sigma_d'] == SgorConfig().sigma_d
-    assert result['parameters']['mode'] == 'consecutive'
+    assert result['parameters']['mode'] == 'keyframe'
     assert result['environment']['numpy'] == np.__version__
     timings = result['timings_ms']
     assert {'total', 'preprocessing', 'matching', 'consistency'} <= timings.keys()
@@ -103,14 +103,14 @@ def test_existing_results_in_a_bag_are_kept(street_bag, replayed, capsys):
     assert 'exists already' in capsys.readouterr().err
 
 
-def test_keyframes_by_option_and_by_file(street_bag, tmp_path):
+def test_settings_by_option_and_by_file(street_bag, tmp_path):
     params = tmp_path / 'p.yaml'
-    params.write_text('/**:\n  ros__parameters:\n    mode: keyframe\n    sigma_d: 0.5\n')
+    params.write_text('/**:\n  ros__parameters:\n    mode: consecutive\n    sigma_d: 0.5\n')
     assert main([str(street_bag), '--output', str(tmp_path), '--params-file', str(params),
                  '--sigma-d', '0.7', '--odom-frame', 'map']) == 0
     parameters = summary(tmp_path)['parameters']
     assert (parameters['mode'], parameters['sigma_d'], parameters['odom_frame']) == (
-        'keyframe', 0.7, 'map')
+        'consecutive', 0.7, 'map')
 
 
 def cdr(message):

@@ -1,6 +1,7 @@
 """`sgor_demo`: the built-in world, played to `sgor_node` over DDS and compared with the truth."""
 import argparse
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 import sys
 from typing import Any
@@ -8,24 +9,32 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+from rosbags.typesys import get_typestore
+from rosbags.typesys import Stores
 from tqdm import tqdm
 
 from ..core.settings import InputError
 from ..evaluation.track import track_errors
 from ..evaluation.track import TrackErrors
+from ..evaluation.track_plots import plot_against_truth
 from ..evaluation.track_plots import plot_errors
-from ..evaluation.track_plots import plot_track
 from ..io.bags import BagReader
+from ..io.bags import CLOUD_TYPE
+from ..io.messages import matrix_of
+from ..io.messages import stamp_ns_of
 from .world_bag import WorldMap
 from .world_bag import write_world_bag
 
 if TYPE_CHECKING:
-    from ..ros.player import Heard
+    from ..ros.player import Player
 
 Array = NDArray[np.float64]
 
 # beyond this, something is wrong with the node or with this machine
 WORST_DRIFT_PERCENT, LEAST_SHARE = 3.0, 0.5
+# about 300 MB, on the disk and in memory
+BAG_SCANS = 150
+LAST_ANSWER_S = 15.0
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -36,6 +45,8 @@ def main(arguments: list[str] | None = None) -> int:
     except InputError as error:
         print(f'error: {error}', file=sys.stderr)
         return 2
+    except TimeoutError as error:
+        return _fail(f'{error}; see {options.out}/node.log')
 
 
 def _parse(arguments: list[str] | None) -> argparse.Namespace:
@@ -46,7 +57,9 @@ def _parse(arguments: list[str] | None) -> argparse.Namespace:
     parser.add_argument('--out', type=Path, default=Path('out/demo'),
                         help='folder for the bag, the pictures and the log; an older bag there '
                         'is replaced')
-    parser.add_argument('--scans', type=int, default=120, help='length of the drive')
+    parser.add_argument('--scans', type=int, default=120,
+                        help=f'scans to play; the bag has {BAG_SCANS} at most, more of them are '
+                        'that drive forth and back')
     parser.add_argument('--rate', type=float, default=10.0, help='scans a second')
     parser.add_argument('--seed', type=int, default=0, help='chooses the place and the noise')
     options = parser.parse_args(arguments)
@@ -60,7 +73,7 @@ def _parse(arguments: list[str] | None) -> argparse.Namespace:
 def _run(options: argparse.Namespace) -> int:
     try:
         # late, so that --help and the message below work without ROS
-        from ..ros.player import isolate
+        from ..ros.player import Domain
         from ..ros.player import NodeProcess
         from ..ros.player import Player
     except ImportError as error:
@@ -71,61 +84,102 @@ def _run(options: argparse.Namespace) -> int:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f'--out {out}: {error.strerror}') from error
-    bag = out / 'bag'
-    isolate()
     _say('starting sgor_node; the first start on a machine compiles, for a minute or two')
-    with NodeProcess(out / 'node.log') as node:
-        truth, world = write_world_bag(bag, options.scans, options.seed)
-        with Player() as player, BagReader(bag) as reader:
-            if not player.wait_for_node(node.alive):
-                return _fail(f'sgor_node did not get ready; see {node.log}')
-            _say(f'sgor_node is ready; playing {len(truth)} scans at {options.rate:g} Hz')
+    with closing(Domain()) as domain, NodeProcess(domain, out / 'node.log') as node:
+        drive, world = write_world_bag(out / 'bag', min(options.scans, BAG_SCANS), options.seed)
+        with BagReader(out / 'bag') as reader:
+            clouds = [cloud.read()[2] for cloud in reader.clouds(reader.find_topic('label'))]
+        scans = list(forth_and_back(list(drive), options.scans))
+        truth = {stamp_ns: drive[original] for original, stamp_ns in scans}
+        with Player(domain) as player:
+            player.wait_for_node(node.alive)
+            _say(f'sgor_node is ready; playing {len(scans)} scans at {options.rate:g} Hz')
             memory = [node.memory_mb()]
-            clouds = tqdm(_clouds(reader), 'playing', len(truth), unit='scan', disable=None)
-            heard = player.play(clouds, 1 / options.rate, node.alive)
+            stream = _restamped(clouds, list(drive), scans)
+            player.play(tqdm(stream, 'playing', len(scans), unit='scan', disable=None),
+                        1 / options.rate, node.alive)
+            last = scans[-1][1]
+            player.spin_until(lambda: not node.alive() or any(
+                stamp_ns_of(told.header) == last for told in player.diagnostics[-1:]),
+                LAST_ANSWER_S, 'answer to the last scan')
         memory.append(node.memory_mb())
         alive = node.alive()
         code = node.stop()
     if not alive or code:
         return _fail(f'sgor_node ended with code {code}; see {node.log}')
-    return _compare(heard, truth, world, memory, options)
+    return _compare(player, truth, world, memory, options)
 
 
-def _compare(heard: 'Heard', truth: dict[int, Array], world: WorldMap, memory_mb: list[float],
+def forth_and_back(stamps_ns: list[int], count: int) -> Iterator[tuple[int, int]]:
+    """Yield (stamp of the scan to play, stamp to give it): neighbours stay neighbours.
+
+    Parameters
+    ----------
+    stamps_ns : list of int
+        Of the recorded scans, at least two, at equal distances.
+    count : int
+        Number of scans to play.
+    """
+    turn = len(stamps_ns) - 1
+    for i in range(count):
+        place = i % (2 * turn)
+        original = stamps_ns[min(place, 2 * turn - place)]
+        yield original, stamps_ns[0] + i * (stamps_ns[1] - stamps_ns[0])
+
+
+def _restamped(clouds: list[Any], recorded_ns: list[int], scans: list[tuple[int, int]]
+               ) -> Iterator[tuple[int, bytes]]:
+    """Yield the new stamp and the serialised cloud of each scan to play."""
+    store = get_typestore(Stores.ROS2_JAZZY)
+    cloud_of = dict(zip(recorded_ns, clouds, strict=True))
+    for original, stamp_ns in scans:
+        cloud = cloud_of[original]
+        cloud.header.stamp.sec, cloud.header.stamp.nanosec = divmod(stamp_ns, 1_000_000_000)
+        yield stamp_ns, bytes(store.serialize_cdr(cloud, CLOUD_TYPE))
+
+
+def _compare(player: 'Player', truth: dict[int, Array], world: WorldMap, memory_mb: list[float],
              options: argparse.Namespace) -> int:
     """Print the table, write the pictures and judge."""
+    from ..ros.player import values_of
     out: Path = options.out
-    answered = [i for i, stamp in enumerate(heard.sent) if stamp in heard.poses]
-    few = f'{len(answered)} odometry messages for {len(heard.sent)} scans; see {out}/node.log'
+    poses = {stamp_ns_of(message.header): matrix_of(message.pose.pose)
+             for message in player.odometry}
+    told = {stamp_ns_of(message.header): values_of(message) for message in player.diagnostics}
+    sent = list(player.sent_s)
+    answered = [i for i, stamp in enumerate(sent) if stamp in poses]
+    few = f'{len(answered)} odometry messages for {len(sent)} scans; see {out}/node.log'
     if len(answered) < 2:
         return _fail(few)
-    stamps = [heard.sent[i] for i in answered]
-    errors = track_errors(np.array([heard.poses[stamp] for stamp in stamps]),
+    stamps = [sent[i] for i in answered]
+    errors = track_errors(np.array([poses[stamp] for stamp in stamps]),
                           np.array([truth[stamp] for stamp in stamps]))
-    seconds = np.array([heard.seconds.get(stamp, np.nan) for stamp in stamps])
-    latency = np.array([heard.latency_s[stamp] for stamp in stamps])
-    _say(report(len(heard.sent), heard.counts, seconds, latency, errors, memory_mb))
-    plot_track(out / 'trajectory.png', errors, np.array(list(truth.values())), world)
+    seconds = np.array([float(told[stamp]['seconds']) if stamp in told else np.nan
+                        for stamp in stamps])
+    latency = np.array([player.heard_s[stamp] - player.sent_s[stamp] for stamp in stamps])
+    _say(report(len(sent), list(told.values())[-1], seconds, latency, errors, memory_mb))
+    plot_against_truth(out / 'trajectory.png', errors, np.array(list(truth.values())), world)
     plot_errors(out / 'errors.png', errors, np.array(answered), seconds, 1 / options.rate)
     _say(f'pictures: {out}/trajectory.png, {out}/errors.png; bag: {out}/bag')
-    if len(answered) < LEAST_SHARE * len(heard.sent):
+    if len(answered) < LEAST_SHARE * len(sent):
         return _fail(few)
     if errors.drift.stretches and not errors.drift.translation_percent < WORST_DRIFT_PERCENT:
         return _fail(f'the drift is above {WORST_DRIFT_PERCENT} %')
     return 0
 
 
-def report(sent: int, counts: dict[str, int], seconds: Array, latency: Array,
+def report(sent: int, counts: dict[str, str], seconds: Array, latency: Array,
            errors: TrackErrors, memory_mb: list[float]) -> str:
-    """Return the table of the demo."""
+    """Return the table of the demo; `counts` is what the node told of the last scan."""
     drift = errors.drift
     rows = [
         ('scans sent', str(sent)),
-        ('  processed', str(counts.get('processed', 0))),
-        ('  replaced by a newer one', str(counts.get('replaced', 0))),
-        ('  failed', str(counts.get('failed', 0))),
-        ('time per scan', _spread(1e3 * seconds, '{:.0f} ms')),
-        ('cloud sent to odometry heard', _spread(1e3 * latency, '{:.0f} ms')),
+        ('  received', counts['received']),
+        ('  processed', counts['processed']),
+        ('  replaced by a newer one', counts['replaced']),
+        ('  failed', counts['failed']),
+        ('time per scan', _spread(1e3 * seconds, '{:.0f} ms', (50, 95, 99))),
+        ('cloud sent to odometry heard', _spread(1e3 * latency, '{:.0f} ms', (50, 95, 99))),
         ('RE of consecutive pairs', _spread(errors.rotation_deg, '{:.3f} deg')),
         ('TE of consecutive pairs', _spread(100 * errors.translation_m, '{:.2f} cm')),
         ('drift', f'{drift.translation_percent:.2f} %, {drift.rotation_deg_per_m:.4f} deg/m'
@@ -135,23 +189,18 @@ def report(sent: int, counts: dict[str, int], seconds: Array, latency: Array,
         ('memory of the node', f'{memory_mb[0]:.0f} MB before, {memory_mb[-1]:.0f} MB after'),
     ]
     width = max(len(name) for name, _ in rows)
-    rule = '-' * (width + 36)
+    rule = '-' * (width + 42)
     lines = [f'{name:<{width}}  {value}' for name, value in rows]
     return '\n'.join([rule, *lines, rule])
 
 
-def _spread(values: Array, unit: str) -> str:
+def _spread(values: Array, unit: str, percentiles: tuple[int, ...] = (50, 95)) -> str:
     values = values[np.isfinite(values)]
     if not len(values):
         return 'unknown'
-    median, p95 = (unit.format(np.quantile(values, q)) for q in (0.5, 0.95))
-    return f'median {median}, p95 {p95}'
-
-
-def _clouds(reader: BagReader) -> Iterator[tuple[int, Any]]:
-    for cloud in reader.clouds(reader.find_topic('label')):
-        stamp_ns, _, message = cloud.read()
-        yield stamp_ns, message
+    return ', '.join(
+        f'{"median" if p == 50 else f"p{p}"} {unit.format(np.percentile(values, p))}'
+        for p in percentiles)
 
 
 def _say(message: str) -> None:

@@ -21,12 +21,12 @@ from ..core.config import SgorConfig
 from ..core.labels import label_convention
 from ..core.settings import InputError
 from ..core.warmup import warm_up
+from ..evaluation.track_plots import plot_track
 from ..io import messages
 from ..io.bags import BagReader
 from ..io.bags import BagWriter
 from ..io.bags import RecordedCloud
 from ..io.environment import describe_environment
-from ..io.plots import plot_track
 from ..io.pointcloud2 import decode
 from ..io.stream_config import StreamConfig
 from ..io.trajectories import write_kitti

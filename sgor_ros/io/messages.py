@@ -70,6 +70,13 @@ def pose(types: Types, T: NDArray[np.float64]) -> Any:
         orientation=types('geometry_msgs/msg/Quaternion')(x=x, y=y, z=z, w=w))
 
 
+def matrix_of(pose: Any) -> NDArray[np.float64]:
+    """Return the (4, 4) transformation of a geometry_msgs/msg/Pose."""
+    x, q = pose.position, pose.orientation
+    return se3.compose(Rotation.from_quat([q.x, q.y, q.z, q.w]).as_matrix(),
+                       np.array([x.x, x.y, x.z]))
+
+
 def pose_stamped(types: Types, tracked: TrackedScan, odom_frame: str) -> Any:
     """Return a geometry_msgs/msg/PoseStamped of a scan that has a pose."""
     return types('geometry_msgs/msg/PoseStamped')(

@@ -1,4 +1,4 @@
-"""Pictures of results; matplotlib is loaded when the first one is drawn."""
+"""The picture of a registration; matplotlib is loaded when it is drawn."""
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ from ..core.settings import InputError
 
 Array = NDArray[np.float64]
 
-BLUE, ORANGE, GREEN, RED, GREY = '#2f6db3', '#e08a1e', '#2a9d5c', '#d1495b', '#8a8f98'
+BLUE, ORANGE, GREEN, RED = '#2f6db3', '#e08a1e', '#2a9d5c', '#d1495b'
 # what the eye still tells apart in a picture of this size
 SHOWN_POINTS = 40000
 SHOWN_REJECTED = 250
@@ -24,43 +24,6 @@ SHOWN_INLIERS = 400
 GROUND_BAND_M = 0.3
 # this share of the points is inside the picture of a scan
 SHOWN_SHARE = 0.97
-
-
-def plot_track(path: str | Path, title: str, stamps_s: Sequence[float],
-               poses: Sequence[Array | None], seconds: Sequence[float],
-               confidence: Sequence[float]) -> None:
-    """Draw the trajectory from above, and time and confidence of each scan.
-
-    Parameters
-    ----------
-    path : str or Path
-        PNG to write.
-    title : str
-    stamps_s : sequence of float
-        Of each scan, seconds.
-    poses : sequence of (4, 4) array or None
-        T_odom_sensor; None where the scan has none.
-    seconds : sequence of float
-        What each scan took; nan where it was not processed.
-    confidence : sequence of float
-        0 to 1; nan where nothing was registered.
-    """
-    figure = _figure((13, 6.2))
-    grid = figure.add_gridspec(2, 2, width_ratios=(1.15, 1))
-    ground, upper = figure.add_subplot(grid[:, 0]), figure.add_subplot(grid[0, 1])
-    lower = figure.add_subplot(grid[1, 1], sharex=upper)
-    figure.suptitle(title, x=0.02, ha='left', weight='bold')
-    _draw_track(ground, poses)
-    time_s = np.asarray(stamps_s) - stamps_s[0]
-    lost = np.array([T is None for T in poses])
-    _draw_times(upper, time_s, np.asarray(seconds) * 1e3)
-    lower.plot(time_s, confidence, '.-', color=GREEN, lw=1, ms=4)
-    for t in time_s[lost]:
-        lower.axvline(t, color=RED, lw=1)
-    lower.set(ylim=(0, 1.05), ylabel='confidence', xlabel='time since the first scan [s]',
-              title='no scan without a pose' if not lost.any()
-              else f'{lost.sum()} scans without a pose (red)')
-    _save(figure, path)
 
 
 def plot_registration(path: str | Path, title: str, source: SemanticScan, target: SemanticScan,
@@ -76,7 +39,7 @@ def plot_registration(path: str | Path, title: str, source: SemanticScan, target
     result : Registration
         Of `source` to `target`; without a transformation the clouds are drawn as they came.
     """
-    figure = _figure((13, 6.8), 'compressed')
+    figure = new_figure(13, 6.8, 'compressed')
     left, right = figure.subplots(1, 2, sharex=True, sharey=True)
     figure.suptitle(title, x=0.02, ha='left', weight='bold')
     T = np.eye(4) if result.T_target_source is None else result.T_target_source
@@ -98,66 +61,27 @@ def plot_registration(path: str | Path, title: str, source: SemanticScan, target
     for axes in (left, right):
         axes.set(aspect='equal', xlabel='x [m]', ylabel='y [m]')
         axes.legend(loc='upper right', markerscale=1.0, framealpha=0.9)
-    _save(figure, path)
+    save(figure, path)
 
 
-def _figure(size: tuple[float, float],
-            layout: Literal['constrained', 'compressed'] = 'constrained') -> Any:
+def new_figure(width: float, height: float,
+               layout: Literal['constrained', 'compressed'] = 'constrained') -> Any:
+    """Return an empty figure that needs no screen; its sides are in inches."""
     try:
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
     except ImportError as error:
         raise InputError(f'pictures need matplotlib: {error}') from error
-    figure = Figure(figsize=size, layout=layout)
-    FigureCanvasAgg(figure)
-    return figure
+    return Figure(figsize=(width, height), layout=layout)
 
 
-def _save(figure: Any, path: str | Path) -> None:
+def save(figure: Any, path: str | Path) -> None:
+    """Give the axes of a figure their looks and write it as PNG."""
     for axes in figure.axes:
         axes.grid(True, color='#e3e6ea', lw=0.6)
         axes.set_axisbelow(True)
         axes.spines[['top', 'right']].set_visible(False)
         axes.title.set_fontsize(10)
     figure.savefig(path, dpi=130, bbox_inches='tight', pad_inches=0.15)
-
-
-def _draw_track(axes: Any, poses: Sequence[Array | None]) -> None:
-    xy = np.array([T[:2, 3] for T in poses if T is not None])
-    bridged = np.array([T is None for T in poses])
-    axes.plot(*xy.T, '-', color=BLUE, lw=2)
-    axes.plot(*xy.T, '.', color=BLUE, ms=5 if len(xy) < 300 else 0)
-    known = np.flatnonzero(~bridged)
-    for i in np.flatnonzero(np.diff(known) > 1):
-        axes.plot(*xy[i:i + 2].T, '-', color=RED, lw=2.5)
-    axes.plot(*xy[0], 'o', color=GREEN, ms=9, label='start')
-    axes.plot(*xy[-1], 's', color=ORANGE, ms=8, label='end')
-    length = np.linalg.norm(np.diff([T[:3, 3] for T in poses if T is not None], axis=0),
-                            axis=1).sum()
-    axes.set(aspect='equal', xlabel='x [m]', ylabel='y [m]',
-             title=f'trajectory from above, {length:.1f} m')
-    # a straight drive is no reason for a picture of one line's height
-    half = max(0.55 * np.ptp(xy, axis=0).max(), 1.0)
-    middle = (xy.min(axis=0) + xy.max(axis=0)) / 2
-    axes.set(xlim=(middle[0] - half, middle[0] + half),
-             ylim=(middle[1] - half, middle[1] + half))
-    axes.legend(loc='best')
-
-
-def _draw_times(axes: Any, time_s: Array, milliseconds: Array) -> None:
-    taken = milliseconds[np.isfinite(milliseconds)]
-    axes.plot(time_s, milliseconds, '.-', color=BLUE, lw=1, ms=4)
-    axes.axhline(float(np.median(taken)), color=GREY, lw=1)
-    period = float(np.median(np.diff(time_s))) * 1e3 if len(time_s) > 1 else 0.0
-    top = float(taken.max())
-    if 0 < period < 3 * top:
-        axes.axhline(period, color=ORANGE, lw=1.2, ls='--')
-        axes.annotate(f'{period:.0f} ms between scans', (time_s[-1], period), color=ORANGE,
-                      ha='right', va='bottom', xytext=(0, 2), textcoords='offset points')
-        top = max(top, period)
-    axes.set(ylim=(0, 1.15 * top), ylabel='time [ms]',
-             title=f'time per scan: median {np.median(taken):.0f} ms, '
-                   f'p95 {np.percentile(taken, 95):.0f} ms')
 
 
 def _on_ground(points: NDArray[Any], ground: Ground | None) -> NDArray[np.bool_]:

@@ -27,36 +27,21 @@ from ..core.settings import Setting
 from ..core.settings import setting
 from ..core.settings import Settings
 from ..core.settings import Value
+from ..io.stream_config import StreamConfig
 from ..tracker import TrackerConfig
 
 LARGEST_INTEGER = 2**31 - 1
 
 
 @dataclass(frozen=True)
-class NodeConfig(Settings):
-    """What only the node needs to know; fixed while it runs."""
+class NodeConfig(StreamConfig):
+    """What concerns the node's connections; fixed while it runs."""
 
-    label_field: str = setting(
-        'label', 'Field of the clouds that holds the class ids; empty: work without labels')
-    odom_frame: str = setting(
-        'odom', 'Frame of the published poses; its origin is the first scan')
-    sensor_frame: str = setting(
-        '', 'Frame of the sensor in what is published; empty: the frame_id of each scan')
     reliability: str = setting(
         'auto', 'QoS of the subscription; auto: reliable, which loses no large clouds, until a '
         'publisher turns up that is best effort only', choices=('auto', 'reliable', 'best_effort'))
     publish_tf: bool = setting(
         False, 'Publish the transform from odom_frame to the sensor frame on /tf')
-
-    def __post_init__(self) -> None:
-        """Refuse what is no frame id."""
-        super().__post_init__()
-        if not self.odom_frame:
-            raise InputError("odom_frame = '': a frame needs a name")
-        for name in ('odom_frame', 'sensor_frame'):
-            if getattr(self, name).startswith('/'):
-                raise InputError(f'{name} = {getattr(self, name)!r}: frame ids have no leading '
-                                 'slash')
 
 
 class NodeParameters:
@@ -145,7 +130,7 @@ def _warn_of_unknown(node: Node) -> None:
 def yaml_files() -> dict[str, str]:
     """Return the parameter files of config/: name to content."""
     indoor = _differences(SgorConfig.indoor())
-    keyframe = _differences(TrackerConfig(mode='keyframe'))
+    consecutive = _differences(TrackerConfig(mode='consecutive'))
     return {
         'sgor_node.yaml': _yaml(
             'All parameters of sgor_node with their defaults.',
@@ -155,9 +140,9 @@ def yaml_files() -> dict[str, str]:
         'indoor.yaml': _yaml(
             'Rooms of a few metres: what differs from the defaults.',
             ('SgorConfig.indoor()', _named(SgorConfig, indoor), indoor)),
-        'keyframe.yaml': _yaml(
-            'Register to keyframes: what differs from the defaults.',
-            ('Tracker', _named(TrackerConfig, keyframe), keyframe))}
+        'consecutive.yaml': _yaml(
+            'Register each scan to the one before: what differs from the defaults.',
+            ('Tracker', _named(TrackerConfig, consecutive), consecutive))}
 
 
 def _differences(config: Settings) -> dict[str, Value]:
