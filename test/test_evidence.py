@@ -1,0 +1,130 @@
+"""What the clouds say about a transformation: partners and free space."""
+from conftest import relative
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from sgor_ros import preprocess
+from sgor_ros import SemanticScan
+from sgor_ros.core.correspondences import Features
+from sgor_ros.core.evidence import evidence
+from sgor_ros.core.evidence import rank
+from sgor_ros.core.evidence import view
+
+REACH, CELL = 0.6, 1.2
+WALL, POLE = 13, 18
+NOTHING_SEEN = np.array([[0, 0, 50]], np.float32)    # a single return, straight up
+
+
+def keypoints(points, labels):
+    points = np.array(points, float).reshape(-1, 3)
+    labels = np.array(labels, np.uint8)
+    return Features(points, labels, labels, np.zeros((len(points), 3), np.float32))
+
+
+@pytest.fixture(scope='module')
+def wall():
+    """Return the view of a sensor that sees one wall at 10 m, with two keypoints on it."""
+    y, z = np.meshgrid(np.arange(-5, 5, 0.05), np.arange(-2, 3, 0.05))
+    points = np.c_[np.full(y.size, 10.0), y.ravel(), z.ravel()].astype(np.float32)
+    return view(points, keypoints([[10, 0, 0], [10, 3, 0]], [WALL, WALL]), CELL)
+
+
+def asked(wall, points, labels, T=None):
+    """Return what both say of keypoints of a source that itself has seen nothing."""
+    source = view(NOTHING_SEEN, keypoints(points, labels), CELL)
+    return evidence(source, wall, np.eye(4) if T is None else T, REACH)
+
+
+@pytest.mark.parametrize(('point', 'agree', 'contradict'), [
+    ((10.3, 0.2, 0), 1, 0),     # a partner of the same label
+    ((5, 0, 0), 0, 1),          # hangs where the wall was seen through it
+    ((15, 0, 0), 0, 0),         # behind the wall: hidden
+    ((9.3, 0, 0), 0, 0),        # in front, but within the margin
+    ((-5, 0, 0), 0, 0),         # nothing was measured there
+    ((5, 1.5, 0), 0, 1),        # towards the second keypoint
+])
+def test_one_point_by_hand(wall, point, agree, contradict):
+    """The wall's own two keypoints agree with half their weight when one has a partner."""
+    found = asked(wall, [point], [WALL])
+    back = 0.5 if agree else 0.0
+    assert found.agree == pytest.approx((agree + back) / 2)
+    assert found.contradict == pytest.approx(contradict / 2)
+
+
+def test_a_point_of_another_label_neither_agrees_nor_contradicts(wall):
+    """Labels may be wrong: something is there, so the point does not hang in free space."""
+    found = asked(wall, [[10.3, 0, 0]], [POLE])
+    assert (found.agree, found.contradict) == (0, 0)
+
+
+def test_shares_by_hand(wall):
+    """Six points: two agree, one contradicts; back, both keypoints of the wall agree."""
+    points = [[10, 0, 0], [10, 3, 0.5], [4, 0, 0], [15, 0, 0], [-5, 0, 0], [10, 0, 0.2]]
+    found = asked(wall, points, [WALL, WALL, WALL, WALL, WALL, POLE])
+    assert found.agree == pytest.approx((2 / 6 + 1) / 2)
+    assert found.contradict == pytest.approx((1 / 6 + 0) / 2)
+    assert 0.8 < found.confidence < found.agree / (found.agree + found.contradict) + 1e-9
+
+
+def test_the_transformation_moves_the_source(wall):
+    """A quarter turn and a shift bring the point onto the wall, the inverse does not."""
+    T = np.eye(4)
+    T[:3, :3] = Rotation.from_euler('z', 90, degrees=True).as_matrix()
+    T[:3, 3] = 6, 0, 0
+    assert asked(wall, [[0, -4, 0]], [WALL], T).agree == pytest.approx(0.75)
+    assert asked(wall, [[0, -4, 0]], [WALL], np.linalg.inv(T)).agree == 0
+
+
+@pytest.mark.parametrize('reach', [0.3, 0.6, 1.2])
+def test_partners_are_found_up_to_the_reach(reach):
+    """Any direction across the cells of the hash: what a distance matrix says."""
+    rng = np.random.default_rng(0)
+    a, b = rng.uniform(-6, 6, (400, 3)), rng.uniform(-6, 6, (300, 3))
+    labels_a, labels_b = rng.choice([WALL, POLE], 400), rng.choice([WALL, POLE], 300)
+    gap = np.linalg.norm(a[:, None] - b, axis=-1)
+    same = (gap <= reach) & (labels_a[:, None] == labels_b)
+    found = evidence(view(NOTHING_SEEN, keypoints(a, labels_a), CELL),
+                     view(NOTHING_SEEN, keypoints(b, labels_b), CELL), np.eye(4), reach)
+    assert found.agree == pytest.approx((same.any(axis=1).mean() + same.any(axis=0).mean()) / 2)
+
+
+def test_no_keypoints_say_nothing(wall):
+    found = asked(wall, [], [])
+    assert (found.agree, found.contradict, found.confidence) == (0, 0, 0)
+
+
+@pytest.fixture(scope='module')
+def views(street):
+    return [preprocess(SemanticScan(points, labels)).view for points, labels, _ in street[:2]]
+
+
+def test_a_scan_agrees_with_itself(views):
+    found = evidence(views[0], views[0], np.eye(4), REACH)
+    assert found.agree == pytest.approx(1.0)
+    assert found.contradict == 0.0
+    assert found.confidence > 0.98
+
+
+def test_right_and_wrong_poses_of_the_street(views, street):
+    """The truth is believed; turned by 90 degrees or 10 m off nothing is."""
+    truth = relative(street[1][2], street[0][2])
+    found = evidence(*views, truth, REACH)
+    assert found.agree > 0.7
+    assert found.confidence > 0.97
+    turned, beside, ahead = truth.copy(), truth.copy(), truth.copy()
+    turned[:3, :3] = Rotation.from_euler('z', 90, degrees=True).as_matrix() @ truth[:3, :3]
+    beside[1, 3] += 10
+    ahead[0, 3] += 10
+    for wrong in (turned, beside, ahead):
+        assert evidence(*views, wrong, REACH).confidence < 0.75
+    ranks = rank(*views, np.array([turned, truth, beside, ahead]))
+    assert np.argmax(ranks) == 1
+
+
+def test_both_directions_say_the_same(views, street):
+    truth = relative(street[1][2], street[0][2])
+    forth = evidence(*views, truth, REACH)
+    back = evidence(*views[::-1], np.linalg.inv(truth), REACH)
+    assert forth.agree == pytest.approx(back.agree, abs=0.002)
+    assert forth.contradict == pytest.approx(back.contradict, abs=0.002)

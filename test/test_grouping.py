@@ -1,0 +1,69 @@
+"""Key correspondences and their groups, against plain Python."""
+import numpy as np
+import pytest
+from test_consistency import random_matches
+
+from sgor_ros import SgorConfig
+from sgor_ros.core.consistency import consistency_graph
+from sgor_ros.core.grouping import group
+from sgor_ros.core.grouping import leading_eigenvector
+
+
+def greedy(points, order, count, spacing):
+    """Return the strongest keys at least `spacing` apart, then the strongest of the others."""
+    taken, passed = [], []
+    for i in order:
+        near = any(np.linalg.norm(points[i] - points[t]) < spacing for t in taken)
+        (passed if near else taken).append(i)
+        if len(taken) == count:
+            break
+    return (taken + passed)[:count]
+
+
+@pytest.mark.parametrize('spacing', [0.0, 5.0, 15.0, 20.0])
+def test_keys_are_the_strongest_that_are_far_enough_apart(spacing):
+    """As a plain loop takes them; where the spacing runs out, the strongest that were left."""
+    matches, _ = random_matches(400, 0.3, 0)
+    config = SgorConfig(groups=100, group_size=30, key_spacing=spacing)
+    graph = consistency_graph(matches, config)
+    order = np.argsort(-leading_eigenvector(graph), kind='stable')
+    keys = group(matches, graph, config).keys
+    assert keys.tolist() == greedy(matches.source, order, 100, spacing)
+    gaps = np.linalg.norm(matches.source[keys][:, None] - matches.source[keys], axis=-1)
+    gaps[np.arange(100), np.arange(100)] = np.inf
+    if spacing == 5.0:
+        assert gaps.min() >= spacing
+    if spacing == 20.0:    # not even 100 balls of 20 m fit here
+        assert gaps.min() < spacing
+
+
+def test_right_matches_are_the_first_keys():
+    """Spectral matching puts the consistent third before the random rest."""
+    matches, T = random_matches(600, 0.3, 1)
+    config = SgorConfig(groups=100)
+    keys = group(matches, consistency_graph(matches, config), config).keys
+    residual = np.linalg.norm(
+        matches.source @ T[:3, :3].T + T[:3, 3] - matches.target, axis=1)
+    assert (residual[keys] < 0.5).mean() > 0.95
+
+
+@pytest.mark.parametrize('size', [3 + 1, 50, 10000])
+def test_groups_are_the_nearest_on_the_source(size):
+    """k nearest by brute force, the key first; never more than there are."""
+    matches, _ = random_matches(200, 0.3, 2)
+    config = SgorConfig(groups=20, group_size=size, group_keep=3)
+    groups = group(matches, consistency_graph(matches, config), config)
+    assert groups.members.shape == (20, min(size, 200))
+    for key, members in zip(groups.keys, groups.members, strict=True):
+        distance = np.linalg.norm(matches.source - matches.source[key], axis=1)
+        assert members[0] == key
+        assert set(members) == set(np.argsort(distance, kind='stable')[:size])
+
+
+def test_fewer_matches_than_groups():
+    """Every match is a key once."""
+    matches, _ = random_matches(12, 1.0, 3)
+    config = SgorConfig(groups=200)
+    groups = group(matches, consistency_graph(matches, config), config)
+    assert sorted(groups.keys) == list(range(12))
+    assert groups.members.shape == (12, 12)
