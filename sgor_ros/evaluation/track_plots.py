@@ -74,7 +74,7 @@ def plot_track(path: str | Path, title: str, stamps_s: Sequence[float],
     middle, half = (xy.min(axis=0) + xy.max(axis=0)) / 2, np.ptp(xy, axis=0).max() / 2
     half = max(half * (1 + 2 * SQUARE_MARGIN), 1.0)
     _frame(above, middle - half, middle + half)
-    above.set_title(f'from above, {travelled_m(track)[-1]:.1f} m')
+    _title(above, f'from above, {travelled_m(track)[-1]:.1f} m')
     above.legend(loc='best')
     time_s = np.asarray(stamps_s) - stamps_s[0]
     _draw_times(upper, time_s, np.asarray(seconds),
@@ -83,9 +83,9 @@ def plot_track(path: str | Path, title: str, stamps_s: Sequence[float],
     lost = np.setdiff1d(np.arange(len(poses)), known)
     for t in time_s[lost]:
         lower.axvline(t, color=LOST, lw=1)
-    lower.set(ylim=(0, 1.05), ylabel='confidence', xlabel='time since the first scan [s]',
-              title=f'{len(lost)} scans without a pose (red)' if len(lost)
-              else 'no scan without a pose')
+    lower.set(ylim=(0, 1.05), ylabel='confidence', xlabel='time since the first scan [s]')
+    _title(lower, f'{len(lost)} scans without a pose (red)' if len(lost)
+           else 'no scan without a pose')
     save(figure, path)
 
 
@@ -114,10 +114,9 @@ def plot_against_truth(path: Path, errors: TrackErrors, T_world_sensor: Array,
     _draw_track(axes, estimate, 1.2)
     _draw_ends(axes, truth)
     _frame(axes, low, high)
-    axes.set_title(f'{len(estimate)} of {len(truth)} scans, {errors.length_m:.0f} m: drift '
-                   f'{errors.drift.translation_percent:.2f} %, end '
-                   f'{100 * errors.end_translation_m:.0f} cm and '
-                   f'{errors.end_rotation_deg:.2f} deg off', loc='left', weight='bold')
+    _title(axes, f'{len(estimate)} of {len(truth)} scans, {errors.length_m:.0f} m: drift '
+           f'{errors.drift.translation_percent:.2f} %, end '
+           f'{100 * errors.end_translation_m:.0f} cm and {errors.end_rotation_deg:.2f} deg off')
     axes.legend(loc='upper left', bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0, frameon=False)
     save(figure, path)
 
@@ -145,6 +144,10 @@ def plot_errors(path: Path, errors: TrackErrors, scans: NDArray[np.int_], second
     _draw_times(bottom, scans, seconds, period_s)
     bottom.set_xlabel('scan')
     save(figure, path)
+
+
+def _title(axes: Any, text: str) -> None:
+    axes.set_title(text, loc='left', fontsize=10, weight='bold')
 
 
 def _draw_track(axes: Any, xy: Array, width: float) -> None:
@@ -178,7 +181,7 @@ def _draw_series(axes: Any, x: NDArray[Any], y: Array, label: str, unit: str) ->
     axes.plot(x, y, '.-' if len(x) < DOTTED else '-', color=ESTIMATE, lw=0.9, ms=5)
     axes.axhline(float(median), color=TRUTH, lw=1)
     axes.set(ylabel=label, ylim=(0, None))
-    axes.set_title(f'median {unit.format(median)}, p95 {unit.format(p95)}', loc='left')
+    _title(axes, f'median {unit.format(median)}, p95 {unit.format(p95)}')
 
 
 def _draw_times(axes: Any, x: NDArray[Any], seconds: Array, period_s: float) -> None:
@@ -188,7 +191,8 @@ def _draw_times(axes: Any, x: NDArray[Any], seconds: Array, period_s: float) -> 
     period = 1e3 * period_s
     if 0 < period < 3 * top:
         axes.axhline(period, color=LIMIT, ls='--', lw=1)
-        axes.annotate(f'{period:.0f} ms between scans', (x[0], period), xytext=(0, 3),
-                      textcoords='offset points', color=LIMIT)
+        axes.annotate(f'{period:.0f} ms\nbetween\nscans', (1.0, period), xytext=(4, 0),
+                      xycoords=('axes fraction', 'data'), textcoords='offset points',
+                      color=LIMIT, va='center', fontsize=9, annotation_clip=False)
         top = max(top, period)
     axes.set_ylim(0, 1.2 * top)
