@@ -123,6 +123,17 @@ def test_choose_takes_evenly_from_the_data_sets():
     assert len(pairing.choose(pairs, 100, seed=0)) == 11
 
 
+def test_choose_takes_evenly_from_near_and_far():
+    pairs = [Pair(frame('a'), frame('a'), apart(x)) for x in (1, 2, 3, 4, 5, 6, 7, 8, 25, 31)]
+    assert sorted(p.distance_m // 10 for p in pairing.choose(pairs, 4, seed=0)) == [0, 0, 2, 3]
+
+
+def apart(x):
+    T = np.eye(4)
+    T[0, 3] = x
+    return T
+
+
 def frame(data_set, name='f'):
     return pairing.Frame(name, data_set, 'semantickitti', lambda: None)
 

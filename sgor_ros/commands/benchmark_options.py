@@ -26,7 +26,7 @@ def benchmark_parser() -> ArgumentParser:
     two.add_argument('--count', type=_positive, default=500, help='wrong pairs')
     for command in (one, two):
         command.add_argument('--limit', type=_positive, default=300, help='right pairs, chosen at '
-                             'random and evenly over the data sets')
+                             'random and evenly over data sets and distances')
     three = _add(commands, 'ablation', 'every mechanism off, one at a time')
     three.add_argument('--pairs', type=_positive, default=200, help='right pairs, likewise')
     for command in (one, two, three):

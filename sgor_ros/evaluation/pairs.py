@@ -1,4 +1,5 @@
 """What is registered to what: scans with known poses, right pairs and wrong pairs of them."""
+from collections import defaultdict
 from collections.abc import Callable
 from collections.abc import Iterable
 from collections.abc import Iterator
@@ -27,6 +28,8 @@ LABEL_FOLDERS = {'labels': 'semantickitti', 'predicted_labels': 'semantickitti_t
 
 NO_OVERLAP_M = 100.0
 """Scans of one drive farther apart than this see different places."""
+
+BAND_M = 10.0
 
 BYTES_PER_POINT = 16
 
@@ -222,10 +225,11 @@ def listed_pairs(folder: Path, max_distance_m: float) -> list[Pair]:
 
 
 def choose(pairs: Sequence[Pair], count: int, seed: int) -> list[Pair]:
-    """Choose up to `count` pairs at random, evenly over the data sets."""
-    data_sets = sorted({pair.data_set for pair in pairs})
-    return _in_turns([[pair for pair in pairs if pair.data_set == data_set]
-                      for data_set in data_sets], count, seed)
+    """Choose up to `count` pairs at random, evenly over data sets and over bands of distance."""
+    kinds = defaultdict(list)
+    for pair in pairs:
+        kinds[pair.distance_m // BAND_M, pair.data_set].append(pair)
+    return _in_turns([kinds[kind] for kind in sorted(kinds)], count, seed)
 
 
 def wrong_pairs(drives: Sequence[Drive], count: int, seed: int) -> list[Pair]:
