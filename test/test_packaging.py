@@ -114,6 +114,26 @@ def test_colcon_package_finds_its_own_tables(by_colcon):
     assert all(int(count) > 10 for count in counts)
 
 
+@pytest.mark.skipif(os.geteuid() == 0 and shutil.which('setpriv') is None,
+                    reason='root may write everywhere')
+def test_a_read_only_install_of_a_user_without_a_home(source, tmp_path):
+    package = shutil.copytree(source / 'sgor_ros', tmp_path / 'ro/sgor_ros')
+    for path in (*package.rglob('*'), package, package.parent):
+        path.chmod(0o555 if path.is_dir() else 0o444)
+    rights = '-dac_override,-dac_read_search'
+    mortal = ['setpriv', f'--bounding-set={rights}', f'--inh-caps={rights}']
+    cache, home = run(
+        *(mortal if os.geteuid() == 0 else []), sys.executable, '-c',
+        'import sgor_ros, numba; print(numba.config.CACHE_DIR, sgor_ros.__file__)',
+        env={**os.environ, 'PYTHONPATH': str(package.parent), 'HOME': str(package / 'home'),
+             'TMPDIR': str(tmp_path), 'XDG_CACHE_HOME': ''}, cwd=tmp_path).split()
+    for folder in (package, package.parent):
+        folder.chmod(0o755)
+    assert Path(home).parent == package
+    assert Path(cache).parent == tmp_path
+    assert Path(cache).stat().st_mode & 0o777 == 0o700
+
+
 def test_node_out_of_install_tracks_and_ends_on_interrupt(by_colcon, tmp_path):
     domain = Domain()
     environment = {**domain.environment(), 'PYTHONPATH': ''}

@@ -36,7 +36,7 @@ def _private_folder() -> Path:
 # numba keeps compiled code beside the source or in the user's cache, and gives up where neither
 # can be written, as in a container of which only /tmp can be
 _USUAL = (Path(__file__).parent,
-          Path(os.environ.get('XDG_CACHE_HOME') or '~/.cache').expanduser())
+          Path(os.environ.get('XDG_CACHE_HOME') or os.path.expanduser('~/.cache')))
 if not _config.CACHE_DIR and not any(map(_writable, _USUAL)):
     _config.CACHE_DIR = str(_private_folder())
 
