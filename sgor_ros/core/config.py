@@ -72,9 +72,9 @@ class SgorConfig(Settings):
         False, 'Let movable classes (people, moving cars) take part')
 
     # grouping (Sec. III-B)
-    groups: int = setting(200, 'Key correspondences L', minimum=1, maximum=5000)
-    group_size: int = setting(400, 'Correspondences in a group k', minimum=3, maximum=20000)
-    group_keep: int = setting(20, 'Correspondences kept in a group k_1', minimum=3, maximum=1000)
+    groups: int = setting(500, 'Key correspondences L', minimum=1, maximum=5000)
+    group_size: int = setting(2000, 'Correspondences in a group k', minimum=3, maximum=20000)
+    group_keep: int = setting(12, 'Correspondences kept in a group k_1', minimum=3, maximum=1000)
     key_spacing: float = setting(
         1.0, 'Keys nearer to a stronger key give way to others', 'm', minimum=0.0, maximum=20.0)
 
@@ -149,7 +149,8 @@ class SgorConfig(Settings):
     def paper(cls) -> Self:
         """Return the paper's steps and nothing besides."""
         return cls(robust_ground=False, match_within_labels=False, height_gate=0.0,
-                   context_weight=0.0, quick_keypoints=0, cloud_check=False,
+                   context_weight=0.0, quick_keypoints=0,
+                   groups=200, group_size=400, cloud_check=False,
                    moving_vote=True, weight_cutoff=6.0, refinement_rounds=1, drop_ground_labels=False,
                    local_refinement=False,
                    min_confidence=0.0)

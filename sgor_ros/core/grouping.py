@@ -5,7 +5,6 @@ from typing import TYPE_CHECKING
 import numba
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from .config import SgorConfig
 from .correspondences import Correspondences
@@ -26,7 +25,7 @@ class Groups:
     keys : (L,) int64
         Key correspondences G^k, the strongest first.
     members : (L, k) int64
-        Correspondences nearest to each key on the source, the key among them.
+        Correspondences nearest to each key on the source, the key among them, in no order.
     """
 
     keys: NDArray[np.int64]
@@ -41,9 +40,7 @@ def group(correspondences: Correspondences, graph: 'ConsistencyGraph',
     keys = _spread(correspondences.source, order, min(config.groups, len(order)),
                    config.key_spacing)
     k = min(config.group_size, len(correspondences))
-    members = cKDTree(correspondences.source).query(
-        correspondences.source[keys], k=k, workers=config.threads)[1].reshape(len(keys), k)
-    return Groups(keys, members.astype(np.int64))
+    return Groups(keys, _nearest(correspondences.source, keys, k))
 
 
 def leading_eigenvector(graph: 'ConsistencyGraph') -> NDArray[np.float32]:
@@ -100,3 +97,52 @@ def _spread(points, order, count, spacing):  # type: ignore[no-untyped-def]
     for k in range(count - n_taken):
         taken[n_taken + k] = passed[k]
     return taken
+
+
+@numba.njit(cache=True, nogil=True, parallel=True)
+def _nearest(points, keys, k):  # type: ignore[no-untyped-def]
+    """Return the k nearest points of each key, (L, k): for large k faster than a tree."""
+    n = len(points)
+    members = np.empty((len(keys), k), np.int64)
+    for g in numba.prange(len(keys)):
+        x, y, z = points[keys[g]]
+        squared = np.empty(n)
+        for i in range(n):
+            squared[i] = ((points[i, 0] - x) ** 2 + (points[i, 1] - y) ** 2
+                          + (points[i, 2] - z) ** 2)
+        limit = _kth_smallest(squared, k)
+        found = 0
+        for i in range(n):
+            if squared[i] < limit:
+                members[g, found] = i
+                found += 1
+        for i in range(n):    # those at the limit share the places that are left
+            if found == k:
+                break
+            if squared[i] == limit:
+                members[g, found] = i
+                found += 1
+    return members
+
+
+@numba.njit(cache=True, nogil=True)
+def _kth_smallest(values, k):  # type: ignore[no-untyped-def]
+    """Select by a histogram first, so that only one bin of it is sorted."""
+    top = values.max()
+    if top == 0:
+        return top
+    scale = 255.0 / top
+    count = np.zeros(256, np.int64)
+    for v in values:
+        count[int(v * scale)] += 1
+    before, at = 0, 0
+    while before + count[at] < k:
+        before += count[at]
+        at += 1
+    inside = np.empty(count[at])
+    n = 0
+    for v in values:
+        if int(v * scale) == at:
+            inside[n] = v
+            n += 1
+    return np.sort(inside)[k - before - 1]
