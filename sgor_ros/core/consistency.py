@@ -140,8 +140,8 @@ def _mark_pairs(columns, limit, bits, upper):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True, parallel=True)
-def _weigh_pairs(p, q, bits, sigma_d, reach, upper, index,
-                 weight):  # type: ignore[no-untyped-def]
+def _weigh_pairs(p, q, bits, sigma_d, reach, upper, index,  # type: ignore[no-untyped-def]
+                 weight):
     """Write W_m of each candidate pair, negative beyond sigma_d, 0 beyond `reach`.
 
     Returns the pairs of each correspondence, (N,).
@@ -172,8 +172,8 @@ def _weigh_pairs(p, q, bits, sigma_d, reach, upper, index,
 
 
 @numba.njit(cache=True, nogil=True)
-def _mirror(upper, index, weight, start, inner, full_index,
-            full_weight):  # type: ignore[no-untyped-def]
+def _mirror(upper, index, weight, start, inner, full_index,  # type: ignore[no-untyped-def]
+            full_weight):
     """Write each pair into both of its rows: consistent ones from the front, others behind."""
     n = len(inner)
     end = start[1:].copy()
@@ -202,8 +202,8 @@ def _mirror(upper, index, weight, start, inner, full_index,
 
 
 @numba.njit(cache=True, nogil=True, parallel=True)
-def _seed_rows(start, inner, index, weight, keys, members, tight, loose,
-               rows):  # type: ignore[no-untyped-def]
+def _seed_rows(start, inner, index, weight, keys, members, tight,  # type: ignore[no-untyped-def]
+               loose, rows):
     for g in numba.prange(len(keys)):
         key = keys[g]
         support = np.zeros(len(inner), np.float32)     # row of M'_g W_m

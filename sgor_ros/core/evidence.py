@@ -155,8 +155,8 @@ def _range_image(points):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True, parallel=True)
-def _shares(points, labels, T, others, other_labels, cell, slots, chain, nearest,
-            reach):  # type: ignore[no-untyped-def]
+def _shares(points, labels, T, others, other_labels, cell, slots,  # type: ignore[no-untyped-def]
+            chain, nearest, reach):
     """Return the shares that agree and that contradict, (H, 2)."""
     shares = np.zeros((len(T), 2))
     outcome = np.zeros((len(T), len(points)), np.int8)
@@ -187,8 +187,8 @@ def _shares(points, labels, T, others, other_labels, cell, slots, chain, nearest
 
 
 @numba.njit(cache=True, nogil=True)
-def _partner(x, y, z, label, others, other_labels, cell, slots, chain,
-             reach):  # type: ignore[no-untyped-def]
+def _partner(x, y, z, label, others, other_labels, cell, slots,  # type: ignore[no-untyped-def]
+             chain, reach):
     """Return whether any point is within reach, and whether one of the same label is."""
     near = False
     limit = reach * reach

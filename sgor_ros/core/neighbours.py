@@ -83,8 +83,8 @@ def _count(columns, cells, order, first, ny, nz, radius, start):  # type: ignore
 
 
 @numba.njit(cache=True, nogil=True, parallel=True)
-def _fill(columns, cells, order, first, ny, nz, radius, start,
-          index, squared):  # type: ignore[no-untyped-def]
+def _fill(columns, cells, order, first, ny, nz, radius, start,  # type: ignore[no-untyped-def]
+          index, squared):
     limit = radius * radius
     for at in numba.prange(len(order)):
         i = np.int64(at)
