@@ -33,7 +33,7 @@ def plot_pairs(path: Path, rows: Sequence[Row], methods: Sequence[str]) -> None:
                  [100 * np.mean([row.success for row in band]) for _, band in bands],
                  'o-', color=f'C{index}', label=name, lw=1.6, ms=5)
     top.set(xlabel='distance of the sensors [m]', ylabel='recall [%]', ylim=(-3, 103))
-    top.legend(fontsize=8)
+    figure.legend(loc='outside lower center', ncols=4)
     _spread(slow, {name: [1e3 * row.seconds for row in own] for name, own in right.items()},
            'two raw scans to transform [ms]')
     _spread(turned, {name: [row.rotation_error_deg for row in own if row.success]
