@@ -60,7 +60,7 @@ def weighted_svd(source, target, weights):
 def truncated_distance(transform, source, target, sigma_d):
     """Return the mean TD (Eq. 18 and 19), metres."""
     total = 0.0
-    for p, q in zip(source, target):
+    for p, q in zip(source, target, strict=True):
         distance = np.linalg.norm(transform[:3, :3] @ p + transform[:3, 3] - q)
         if distance <= 0.5 * sigma_d:
             total += 0.5 * sigma_d

@@ -67,7 +67,7 @@ def assert_graph_and_rows(matches, config):
     rows = seed_rows(graph, groups, *label_agreement(matches, config.semantics))
     tight = dense.semantic_consistency(matches.source_labels, matches.target_labels)
     loose = dense.semantic_consistency(matches.source_regional, matches.target_regional)
-    for key, members, row in zip(groups.keys, groups.members, rows):
+    for key, members, row in zip(groups.keys, groups.members, rows, strict=True):
         expected = dense.group_matrix(members, consistent, weights, tight, loose)
         seed = list(members).index(key)
         np.testing.assert_allclose(row, expected[seed], rtol=1e-5, atol=1e-5)

@@ -26,7 +26,8 @@ def open3d_cloud(points):
 
 def test_voxels_by_hand():
     """Means of the members; the label most of them have, not the first."""
-    points = np.array([[0.1, 0.1, 0.1], [0.3, 0.1, 0.1], [0.2, 0.4, 0.1], [-0.1, 0, 0]], np.float32)
+    points = np.array([[0.1, 0.1, 0.1], [0.3, 0.1, 0.1], [0.2, 0.4, 0.1], [-0.1, 0, 0]],
+                      np.float32)
     grid = voxel_grid(points, np.array([1, 7, 7, 2], np.uint8), 0.5)
     np.testing.assert_allclose(grid.points, [[0.2, 0.2, 0.1], [-0.1, 0, 0]], atol=1e-6)
     assert list(grid.labels) == [7, 2]

@@ -1,2 +1,2 @@
 """The method: numpy arrays in, result objects out. No ROS, no printing."""
-from . import threads as threads    # first: it sets how OpenMP waits
+from . import threads as threads  # first: it sets how OpenMP waits

@@ -1,4 +1,4 @@
-"""Whether to trust a registration: confidence from the evidence of the clouds (beyond the paper)."""
+"""Whether to trust a registration: confidence from evidence (beyond the paper)."""
 from dataclasses import replace
 
 from .config import SgorConfig
@@ -40,5 +40,5 @@ def judge(result: Registration, source: View, target: View, reach: float,
         return result
     return replace(result, success=False,
                    reason=f'confidence {found.confidence:.2f} is below min_confidence '
-                          f'{config.min_confidence:.2f}: of the keypoints {found.agree:.0%} agree, '
-                          f'{found.contradict:.0%} contradict')
+                          f'{config.min_confidence:.2f}: of the keypoints {found.agree:.0%} '
+                          f'agree, {found.contradict:.0%} contradict')

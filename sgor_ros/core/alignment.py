@@ -79,10 +79,10 @@ def _covariance(result: small_gicp.RegistrationResult,
     # GICP's errors are Mahalanobis: their mean square scales the inverse Hessian
     mean_square = 2.0 * result.error / (3 * pairs - 6)
     local = np.linalg.inv(hessian) * mean_square * CORRELATED_PAIRS
-    # from (rotation, translation) on the right of T to (translation, rotation) on its left
-    R, t = T[:3, :3], T[:3, 3]
-    skew = np.array([[0, -t[2], t[1]], [t[2], 0, -t[0]], [-t[1], t[0], 0]])
+    # from (rotation, translation) on the right of T to (translation, rotation) in the target
+    R = T[:3, :3]
     to_target = np.zeros((6, 6))
     to_target[:3, 3:] = R
     to_target[3:, :3] = R
-    return to_target @ local @ to_target.T
+    covariance: NDArray[np.float64] = to_target @ local @ to_target.T
+    return covariance

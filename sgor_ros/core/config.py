@@ -116,7 +116,8 @@ class SgorConfig(Settings):
         0.6, 'Keypoints with one of the same label nearer than this under the result agree', 'm',
         minimum=0.01, maximum=10.0)
     min_confidence: float = setting(
-        0.88, 'Results below this confidence are failures; 0: accept all', minimum=0.0, maximum=1.0)
+        0.88, 'Results below this confidence are failures; 0: accept all',
+        minimum=0.0, maximum=1.0)
 
     threads: int = setting(2, 'Processor cores to use', minimum=1, maximum=64)
 
@@ -139,18 +140,17 @@ class SgorConfig(Settings):
     @classmethod
     def indoor(cls) -> Self:
         """Return a preset for rooms and fragments of a few metres."""
-        return cls(min_range=0.0, max_range=20.0, voxel_size=0.05, sigma_g=0.03,
-                   normal_radius=0.10, descriptor_radius=0.25, vote_radius=0.10, context_scale=0.15,
-                   height_gate=0.0, key_spacing=0.1, sigma_d=0.10, tau_1=0.10,
-                   ground_check=False, local_reach=0.10,
-                   evidence_reach=0.10)
+        return cls(
+            min_range=0.0, max_range=20.0, voxel_size=0.05, sigma_g=0.03, normal_radius=0.10,
+            descriptor_radius=0.25, vote_radius=0.10, context_scale=0.15, height_gate=0.0,
+            key_spacing=0.1, sigma_d=0.10, tau_1=0.10, ground_check=False, local_reach=0.10,
+            evidence_reach=0.10)
 
     @classmethod
     def paper(cls) -> Self:
         """Return the paper's steps and nothing besides."""
-        return cls(robust_ground=False, match_within_labels=False, height_gate=0.0,
-                   context_weight=0.0, quick_keypoints=0,
-                   groups=200, group_size=400, cloud_check=False,
-                   moving_vote=True, weight_cutoff=6.0, refinement_rounds=1, drop_ground_labels=False,
-                   local_refinement=False,
-                   min_confidence=0.0)
+        return cls(
+            robust_ground=False, drop_ground_labels=False, match_within_labels=False,
+            height_gate=0.0, context_weight=0.0, moving_vote=True, quick_keypoints=0, groups=200,
+            group_size=400, weight_cutoff=6.0, cloud_check=False, refinement_rounds=1,
+            local_refinement=False, min_confidence=0.0)

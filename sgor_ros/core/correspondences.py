@@ -1,6 +1,5 @@
 """Semantic overlap region and feature matching (Sec. III-B, Eq. 4)."""
 from dataclasses import dataclass
-from dataclasses import fields
 
 import numba
 import numpy as np
@@ -70,8 +69,10 @@ class Features:
     context: NDArray[np.float32] | None = None
 
     def __getitem__(self, rows: NDArray[np.intp] | NDArray[np.bool_]) -> 'Features':
-        columns = (getattr(self, f.name) for f in fields(self))
-        return Features(*(None if column is None else column[rows] for column in columns))
+        return Features(self.points[rows], self.labels[rows], self.regional[rows],
+                        self.descriptors[rows],
+                        None if self.heights is None else self.heights[rows],
+                        None if self.context is None else self.context[rows])
 
 
 def given_correspondences(source_points: ArrayLike, target_points: ArrayLike,
@@ -94,8 +95,10 @@ def given_correspondences(source_points: ArrayLike, target_points: ArrayLike,
         none = np.full(len(p), UNLABELLED, np.uint8)
         return Correspondences(p, q, none, none, none, none)
     convention = label_convention(config.label_convention)
-    s, s_regional = _voted(p, as_labels(source_labels, len(p), 'source_labels'), convention, config)
-    t, t_regional = _voted(q, as_labels(target_labels, len(p), 'target_labels'), convention, config)
+    s_ids = as_labels(source_labels, len(p), 'source_labels')
+    t_ids = as_labels(target_labels, len(p), 'target_labels')
+    s, s_regional = _voted(p, s_ids, convention, config)
+    t, t_regional = _voted(q, t_ids, convention, config)
     return Correspondences(p, q, s, t, s_regional, t_regional)
 
 
@@ -123,9 +126,10 @@ def match(source: Features, target: Features, config: SgorConfig) -> Corresponde
         raise InputError(f'descriptors: source has {source.descriptors.shape[1]} columns, target '
                          f'{target.descriptors.shape[1]}')
     source = source[thin(len(source.points), config.max_correspondences)]
-    none = source.heights is None or target.heights is None
-    source_heights = np.zeros(len(source.points)) if none else source.heights
-    target_heights = np.zeros(len(target.points)) if none else target.heights
+    if source.heights is None or target.heights is None:
+        source_heights, target_heights = np.zeros(len(source.points)), np.zeros(len(target.points))
+    else:
+        source_heights, target_heights = source.heights, target.heights
     gate = config.height_gate if config.height_gate > 0 else np.inf
     block = target.regional if config.match_within_labels else np.zeros_like(target.regional)
     wanted = source.regional if config.match_within_labels else np.zeros_like(source.regional)

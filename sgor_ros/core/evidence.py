@@ -19,7 +19,7 @@ AZIMUTHS, ELEVATIONS = 360, 180
 """Cells of the range image: 1 degree, wider than the gaps between beams."""
 MARGIN_SHARE = 0.02
 """A point contradicts when it is nearer than all that was seen there by this share of the range
-and one cell of the view: edges and grazing rays must not speak against the right transformation."""
+and one cell of the view: edges and grazing rays must not speak against what is right."""
 DOUBT = 0.01
 """Share of keypoints that speaks against every transformation: a handful alone proves nothing."""
 SAMPLE = 400
@@ -179,10 +179,10 @@ def _shares(points, labels, T, others, other_labels, cell, slots,  # type: ignor
                 # nothing measured there is no evidence
                 if nearest[a, e] < np.inf and r < nearest[a, e] * (1 - MARGIN_SHARE) - cell:
                     outcome[h, i] = 2
-    for h in range(len(T)):
-        for i in range(len(points)):
-            if outcome[h, i] > 0:
-                shares[h, outcome[h, i] - 1] += 1.0 / len(points)
+    for row in range(len(T)):
+        for column in range(len(points)):
+            if outcome[row, column] > 0:
+                shares[row, outcome[row, column] - 1] += 1.0 / len(points)
     return shares
 
 

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from .angles import atan2
 from .neighbours import Neighbours
-from .voxels import winning_labels
 from .voxels import VoxelCloud
+from .voxels import winning_labels
 
 BINS = 11
 DESCRIPTOR_SIZE = 3 * BINS
@@ -36,7 +36,8 @@ def normals(points: NDArray[np.float64], neighbours: Neighbours,
         ``(0, 0, 1)`` turned to the sensor where fewer than three points lie within the radius.
     """
     found = np.empty((len(points), 3))
-    _normals(points, neighbours.start, neighbours.index, neighbours.squared, radius * radius, found)
+    _normals(points, neighbours.start, neighbours.index, neighbours.squared, radius * radius,
+             found)
     return found
 
 
@@ -157,7 +158,14 @@ def _across(a, xy, xz, b, yz, c):  # type: ignore[no-untyped-def]
 @numba.njit(cache=True, nogil=True, inline='always')
 def _angle_bin(y, x):  # type: ignore[no-untyped-def]
     """Return floor(11 (atan2(y, x) + pi) / 2 pi)."""
-    return np.int32((atan2(y, x) + np.float32(math.pi)) * np.float32(BINS / (2 * math.pi)))
+    bin_ = np.int32((atan2(y, x) + np.float32(math.pi)) * np.float32(BINS / (2 * math.pi)))
+    return min(max(bin_, 0), BINS - 1)
+
+
+@numba.njit(cache=True, nogil=True, inline='always')
+def _cosine_bin(cosine):  # type: ignore[no-untyped-def]
+    """Return floor(11 (cosine + 1) / 2)."""
+    return min(max(np.int32((cosine + 1) * np.float32(BINS / 2)), 0), BINS - 1)
 
 
 @numba.njit(cache=True, nogil=True, parallel=True, error_model='numpy',
@@ -207,15 +215,14 @@ def _simple_histograms(points, normals, start, index, simple):  # type: ignore[n
             theta_y = np.float32(0.0) if flat else wx * tx + wy * ty + wz * tz
             theta_x = np.float32(1.0) if flat else ux * tx + uy * ty + uz * tz
             phi = np.float32(0.0) if flat else phi
-            bins[0, k] = min(max(_angle_bin(theta_y, theta_x), 0), BINS - 1)
-            bins[1, k] = BINS + min(max(np.int32((alpha + 1) * np.float32(BINS / 2)), 0), BINS - 1)
-            bins[2, k] = 2 * BINS + min(max(np.int32((phi + 1) * np.float32(BINS / 2)), 0),
-                                        BINS - 1)
+            bins[0, k] = _angle_bin(theta_y, theta_x)
+            bins[1, k] = _cosine_bin(alpha)
+            bins[2, k] = _cosine_bin(phi)
         step = np.float32(100.0 / count)
         for k in range(count):
             simple[i, bins[0, k]] += step
-            simple[i, bins[1, k]] += step
-            simple[i, bins[2, k]] += step
+            simple[i, BINS + bins[1, k]] += step
+            simple[i, 2 * BINS + bins[2, k]] += step
 
 
 @numba.njit(cache=True, nogil=True, parallel=True, error_model='numpy', fastmath=True)

@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 from .config import SgorConfig
 from .voxels import VoxelCloud
 
-
 GEOMETRY_TRIALS = 300
 GEOMETRY_SEED = 0
 

@@ -88,7 +88,8 @@ def preprocess(scan: SemanticScan, config: SgorConfig | None = None, *,
             warnings.append('no ground labels: ground plane found by geometry')
     with clock('view'):
         sight = view(points, features, 2 * config.evidence_reach)
-    return PreparedScan(scan, config, features, ground, sight, local, tuple(warnings), clock.seconds)
+    return PreparedScan(scan, config, features, ground, sight, local, tuple(warnings),
+                        clock.seconds)
 
 
 def _usable(scan: SemanticScan, convention: LabelConvention, config: SgorConfig

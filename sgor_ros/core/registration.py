@@ -31,7 +31,6 @@ from .threads import use_threads
 from .verification import Normals
 from .verification import verify
 
-
 FEW_INLIERS = 50
 """With fewer the fit is off by decimetres at the far end of a scan."""
 
@@ -100,7 +99,7 @@ def _locally(result: Registration, source: PreparedScan, target: PreparedScan,
         return result
     if source.surface is not None and target.surface is not None:
         local = align(source.surface, target.surface, result.T_target_source,
-                      result.inliers.sum() < FEW_INLIERS, config)
+                      bool(result.inliers.sum() < FEW_INLIERS), config)
         agree = distances(local.T_target_source, result.source_points,
                           result.target_points) < config.tau_1
         result = replace(result, T_target_source=local.T_target_source,

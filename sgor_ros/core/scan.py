@@ -1,4 +1,4 @@
-"""The way in (`SemanticScan`), one scan made ready (`PreparedScan`), the way out (`Registration`)."""
+"""The way in (`SemanticScan`), what is made of it, and the way out (`Registration`)."""
 from dataclasses import dataclass
 from dataclasses import field
 

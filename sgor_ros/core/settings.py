@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from dataclasses import field
 import math
 from typing import Any
+from typing import cast
 from typing import Self
 
 Value = bool | int | float | str
@@ -58,28 +59,28 @@ class Setting:
         choices = f' ({", ".join(self.choices)})' if self.choices else ''
         return f'{self.meaning}{unit}{choices}'
 
-    def check(self, value: Any) -> Value:
-        """Return `value` as this setting's type.
+    def check(self, given: object) -> Value:
+        """Return `given` as this setting's type.
 
         Raises
         ------
         InputError
             Wrong type, not finite, out of bounds, or not one of the choices.
         """
-        if self.kind is float and isinstance(value, int) and not isinstance(value, bool):
-            value = float(value)
-        if type(value) is not self.kind:
+        value = float(given) if self.kind is float and type(given) is int else given
+        if type(value) is not self.kind or not isinstance(value, bool | int | float | str):
             raise InputError(f'{self.name} = {value!r}: expected {self.kind.__name__}, '
                              f'got {type(value).__name__}')
         if isinstance(value, float) and not math.isfinite(value):
             raise InputError(f'{self.name} = {value!r}: not a finite number')
-        if self.minimum is not None and value < self.minimum:
-            raise InputError(f'{self.name} = {value!r}: below the minimum {self.minimum}')
-        if self.maximum is not None and value > self.maximum:
-            raise InputError(f'{self.name} = {value!r}: above the maximum {self.maximum}')
+        if not isinstance(value, str):
+            if self.minimum is not None and value < self.minimum:
+                raise InputError(f'{self.name} = {value!r}: below the minimum {self.minimum}')
+            if self.maximum is not None and value > self.maximum:
+                raise InputError(f'{self.name} = {value!r}: above the maximum {self.maximum}')
         if self.choices and value not in self.choices:
             raise InputError(f'{self.name} = {value!r}: not one of {", ".join(self.choices)}')
-        return value  # type: ignore[no-any-return]
+        return value
 
 
 @dataclass(frozen=True)
@@ -93,7 +94,7 @@ class Settings:
     @classmethod
     def settings(cls) -> tuple[Setting, ...]:
         """Return the fields in their order, with defaults, units and bounds."""
-        return tuple(Setting(name=f.name, default=f.default, **f.metadata)
+        return tuple(Setting(f.name, cast(Value, f.default), **f.metadata)
                      for f in dataclasses.fields(cls))
 
     @classmethod

@@ -11,7 +11,6 @@ from .evidence import rank
 from .evidence import View
 from .hypotheses import Hypotheses
 
-
 Normals = tuple[NDArray[np.float64], NDArray[np.float64]]
 """Ground normals of source and target, unit (3,) vectors towards their sensors."""
 
@@ -41,8 +40,9 @@ class Verdict:
         return f'none of {len(self.cost)} hypotheses keeps the ground level'
 
 
-def verify(hypotheses: Hypotheses, correspondences: Correspondences, ground_normals: Normals | None,
-           views: tuple[View, View] | None, config: SgorConfig) -> Verdict:
+def verify(hypotheses: Hypotheses, correspondences: Correspondences,
+           ground_normals: Normals | None, views: tuple[View, View] | None,
+           config: SgorConfig) -> Verdict:
     """Drop hypotheses that tilt the ground, then take the nearest fit of the filtered matches.
 
     With the views of source and target and `cloud_check`, the clouds choose instead of the fit.
