@@ -102,6 +102,7 @@ class Tracker:
     def reset(self) -> None:
         """Forget everything: the next scan is the origin of a new track."""
         self._reference: _Reference | None = None
+        self._last_T_odom_sensor: NDArray[np.float64] = np.eye(4)
         self._failures = 0
         self._last_stamp_ns: int | None = None
 
@@ -133,6 +134,7 @@ class Tracker:
         T_odom_sensor = reference.T_odom_sensor @ step.T_target_source
         covariance = _compose_covariance(reference.T_odom_sensor, reference.covariance,
                                          step.T_target_source, step.covariance)
+        self._last_T_odom_sensor = T_odom_sensor
         share = self._inlier_share(step)
         keyframe = self._is_keyframe(step.T_target_source, share)
         if keyframe:
@@ -151,6 +153,7 @@ class Tracker:
                                None, None, None, None, False, False, tuple(warnings),
                                dict(prepared.timings))
         self._failures = 0
+        self._last_T_odom_sensor = T_odom_sensor
         self._reference = _Reference(prepared, stamp_ns, T_odom_sensor, covariance)
         return TrackedScan(stamp_ns, True, '', T_odom_sensor, covariance, None, None, None, True,
                            True, tuple(warnings), dict(prepared.timings))
@@ -161,11 +164,13 @@ class Tracker:
         assert self._reference is not None
         old = self._reference
         self._failures += 1
-        lost = self._failures >= self.tracker_config.max_failures
+        failures = self._failures
+        # a scan that nothing can be registered to leaves the reference as it is
+        lost = (failures >= self.tracker_config.max_failures
+                and self._begin(prepared, stamp_ns, self._last_T_odom_sensor, None, []).success)
         if lost:
-            warnings.append(f'{self._failures} registrations in a row failed: the track goes on '
+            warnings.append(f'{failures} registrations in a row failed: the track goes on '
                             'from the last known pose')
-            self._begin(prepared, stamp_ns, old.T_odom_sensor, None, warnings)
         return TrackedScan(stamp_ns, False, step.reason, None, None, None, step, old.stamp_ns,
                            lost, lost, tuple(warnings), timings)
 

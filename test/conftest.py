@@ -31,6 +31,13 @@ def street():
 
 
 @pytest.fixture(scope='session')
+def elsewhere():
+    """Return scans of another street, 6 m apart: (points, labels, T_world_sensor) of each."""
+    lidar = Lidar(beams=64, columns=900)
+    return [scan[1:] for scan in simulate(3, seed=1, lidar=lidar, speed=60.0)]
+
+
+@pytest.fixture(scope='session')
 def street_bag(street, tmp_path_factory):
     """Return an mcap bag of the street on /points."""
     return write_bag(tmp_path_factory.mktemp('street') / 'bag',

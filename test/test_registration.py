@@ -1,0 +1,283 @@
+"""Two scans in, transformation out: the street, whose truth is known."""
+from conftest import errors
+from conftest import relative
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from sgor_ros import preprocess
+from sgor_ros import register
+from sgor_ros import SemanticScan
+from sgor_ros import SgorConfig
+
+
+@pytest.fixture(scope='module')
+def scans(street):
+    return [SemanticScan(points, labels) for points, labels, _ in street]
+
+
+@pytest.fixture(scope='module')
+def prepared(scans):
+    return [preprocess(scan) for scan in scans]
+
+
+def turned(scan, R):
+    """Return the scan of a sensor that is mounted turned by the inverse of R."""
+    return SemanticScan(scan.points @ R.T, scan.labels)
+
+
+def truth_of(street, source, target, R_source=None, R_target=None):
+    """Return T_target_source of two scans, each turned."""
+    T = relative(street[target][2], street[source][2])
+    A, B = np.eye(4), np.eye(4)
+    A[:3, :3] = np.eye(3) if R_source is None else R_source
+    B[:3, :3] = np.eye(3) if R_target is None else R_target
+    return B @ T @ np.linalg.inv(A)
+
+
+def assert_right(result, truth, metres=0.05, degrees=0.2):
+    assert result.success, result.reason
+    assert result.reason == ''
+    found = errors(result.T_target_source, truth)
+    assert found[0] < metres
+    assert found[1] < degrees
+
+
+def assert_refused(result):
+    """No success, a reason in words, and no identity that somebody might use."""
+    assert not result.success
+    assert result.reason
+    assert result.T_target_source is None or not np.allclose(result.T_target_source, np.eye(4))
+
+
+@pytest.mark.parametrize('seed', range(5))
+def test_any_yaw(scans, street, seed):
+    """Two sensors turned by anything: 5 cm and 0.2 degrees, without a guess."""
+    rng = np.random.default_rng(seed)
+    source, target = rng.permutation(4)[:2]
+    R_source, R_target = (Rotation.from_euler('z', a).as_matrix()
+                          for a in rng.uniform(-np.pi, np.pi, 2))
+    result = register(turned(scans[source], R_source), turned(scans[target], R_target))
+    assert_right(result, truth_of(street, source, target, R_source, R_target))
+
+
+@pytest.mark.parametrize('angles', [(0.3, 0.4, 0.0), (2.0, -0.3, 0.3), (1.0, 0.0, 1.4)])
+def test_any_mounting(scans, street, angles):
+    """A rigid motion of the input moves the answer, tilted and sideways sensors too."""
+    R = Rotation.from_euler('zyx', angles).as_matrix()
+    plain = register(scans[2], scans[0])
+    both = register(turned(scans[2], R), turned(scans[0], R))
+    one = register(turned(scans[2], R), scans[0])
+    assert_right(both, truth_of(street, 2, 0, R, R))
+    assert_right(one, truth_of(street, 2, 0, R))
+    M = np.eye(4)
+    M[:3, :3] = R
+    metres, degrees = errors(one.T_target_source @ M, plain.T_target_source)
+    assert metres < 0.03
+    assert degrees < 0.1
+
+
+def test_points_of_a_base_frame(scans, street):
+    """Points given in a frame on the ground, where the plane runs through the origin."""
+    lifted = [SemanticScan(scan.points + np.float32([1.0, 0, 1.73]), scan.labels)
+              for scan in scans]
+    T_base_sensor = np.eye(4)
+    T_base_sensor[:3, 3] = 1.0, 0, 1.73
+    result = register(lifted[2], lifted[0])
+    assert_right(result, T_base_sensor @ truth_of(street, 2, 0) @ np.linalg.inv(T_base_sensor))
+
+
+def test_both_directions_are_inverse_to_each_other(prepared):
+    for i, j in ((1, 0), (3, 0), (3, 1)):
+        there, back = register(prepared[i], prepared[j]), register(prepared[j], prepared[i])
+        metres, degrees = errors(there.T_target_source @ back.T_target_source, np.eye(4))
+        assert metres < 0.05
+        assert degrees < 0.1
+
+
+EXACT = ('source_points', 'target_points', 'inliers', 'hypotheses', 'passed_ground_check')
+
+
+@pytest.mark.parametrize(('threads', 'rounding'), [(1, 0.0), (2, 1e-9)])
+def test_the_same_input_gives_the_same_output(scans, threads, rounding):
+    """Bit by bit but for the sums of GICP, whose order is left to its threads."""
+    config = SgorConfig(threads=threads)
+    first, again = register(scans[1], scans[0], config), register(scans[1], scans[0], config)
+    ready = register(preprocess(scans[1], config), preprocess(scans[0], config), config)
+    for other in (again, ready):
+        for name in EXACT:
+            np.testing.assert_array_equal(getattr(first, name), getattr(other, name), err_msg=name)
+        for name in ('T_target_source', 'covariance', 'confidence'):
+            np.testing.assert_allclose(getattr(first, name), getattr(other, name), rtol=rounding,
+                                       atol=rounding, err_msg=name)
+        assert first.best_hypothesis == other.best_hypothesis
+
+
+def test_a_scan_with_itself_is_the_identity(prepared):
+    result = register(prepared[0], prepared[0])
+    assert result.success
+    assert result.confidence > 0.98
+    np.testing.assert_allclose(result.T_target_source, np.eye(4), atol=1e-3)
+
+
+def test_what_the_result_tells(prepared, street):
+    """Inliers lie where the transformation brings them, the winner is one of the hypotheses."""
+    result = register(prepared[1], prepared[0])
+    T = result.T_target_source
+    residual = np.linalg.norm(result.source_points @ T[:3, :3].T + T[:3, 3]
+                              - result.target_points, axis=1)
+    np.testing.assert_array_equal(result.inliers, residual < SgorConfig().tau_1)
+    assert result.passed_ground_check[result.best_hypothesis]
+    metres, degrees = errors(result.hypotheses[result.best_hypothesis], truth_of(street, 1, 0))
+    assert metres < 1.0
+    assert degrees < 3.0
+    assert result.source_ground is prepared[1].ground
+    assert result.target_ground is prepared[0].ground
+    assert result.warnings == ()
+    assert np.linalg.eigvalsh(result.covariance).min() > 0
+    assert {'matching', 'verification', 'alignment'} <= set(result.timings)
+    assert all(seconds >= 0 for seconds in result.timings.values())
+
+
+def half_random(scan, seed):
+    rng = np.random.default_rng(seed)
+    wrong = rng.random(len(scan)) < 0.5
+    return SemanticScan(scan.points, np.where(wrong, rng.choice(np.unique(scan.labels), len(scan)),
+                                              scan.labels))
+
+
+@pytest.mark.parametrize(('source', 'target'), [(1, 0), (3, 0), (2, 3)])
+def test_half_of_all_labels_wrong(scans, street, source, target):
+    result = register(half_random(scans[source], 0), half_random(scans[target], 1))
+    assert_right(result, truth_of(street, source, target))
+
+
+def test_no_labels_at_all(scans, street):
+    """It registers, and both warnings say how the ground was found."""
+    result = register(SemanticScan(scans[3].points), SemanticScan(scans[0].points))
+    assert_right(result, truth_of(street, 3, 0))
+    assert result.source_ground.source == result.target_ground.source == 'geometry'
+    for side in ('source', 'target'):
+        assert f'{side}: no ground labels: ground plane found by geometry' in result.warnings
+
+
+@pytest.mark.xfail(strict=True, reason='nothing of one label matches nothing without')
+@pytest.mark.parametrize('labelled', ['source', 'target'])
+def test_labels_in_one_scan_only(scans, street, labelled):
+    """There are no common classes; it is no worse than without labels."""
+    bare = [SemanticScan(scan.points) for scan in scans]
+    source, target = (scans[1], bare[0]) if labelled == 'source' else (bare[1], scans[0])
+    assert_right(register(source, target), truth_of(street, 1, 0))
+
+
+ABLATIONS = {
+    'without preprocessing': {'correspondence_preprocessing': False},
+    'ground by labels only': {'secondary_ground': False},
+    'geometry only': {'semantics': 'none'},
+    'hard semantics': {'semantics': 'hard'},
+    'without ground check': {'ground_check': False},
+    'matching across labels': {'match_within_labels': False},
+    'matching across heights': {'height_gate': 0.0},
+    'without context': {'context_weight': 0.0},
+    'one attempt': {'quick_keypoints': 0},
+    'truncated distance': {'cloud_check': False},
+    'without local refinement': {'local_refinement': False},
+    'movers vote': {'moving_vote': True},
+    'plane as printed': {'robust_ground': False},
+}
+
+
+@pytest.mark.parametrize('changes', ABLATIONS.values(), ids=ABLATIONS)
+def test_each_ablation_runs_and_registers(scans, street, changes):
+    """One setting turned off loses no pair as easy as this one."""
+    config = SgorConfig().replace(**changes)
+    result = register(scans[1], scans[0], config)
+    assert_right(result, truth_of(street, 1, 0), 0.3, 1.0)
+
+
+def test_the_paper_registers(scans, street):
+    result = register(scans[1], scans[0], SgorConfig.paper())
+    assert_right(result, truth_of(street, 1, 0), 0.3, 1.0)
+    assert result.covariance is None
+
+
+def test_ablations_change_what_they_say(scans):
+    """Each is seen in the result at the place that it is about."""
+    def run(**changes):
+        return register(scans[1], scans[0], SgorConfig(**changes))
+
+    def heights(result, side):
+        ground = getattr(result, f'{side}_ground')
+        return ground.heights(getattr(result, f'{side}_points'))
+
+    default = run()
+    assert np.abs(heights(default, 'source')).min() >= SgorConfig().sigma_g
+    assert np.abs(heights(run(correspondence_preprocessing=False), 'source')).min() < 0.1
+
+    road = default.source_ground.mask.sum()
+    assert run(secondary_ground=False).source_ground.mask.sum() != road
+
+    assert not run(sigma_theta=0.005).passed_ground_check.all()
+    assert run(sigma_theta=0.005, ground_check=False).passed_ground_check.all()
+
+    gap = np.abs(heights(default, 'source') - heights(default, 'target'))
+    assert gap.max() <= SgorConfig().height_gate + 1e-9
+    free = run(height_gate=0.0)
+    assert np.abs(heights(free, 'source') - heights(free, 'target')).max() > 1.0
+
+    assert len(default.source_points) <= SgorConfig().quick_keypoints
+    assert len(run(quick_keypoints=0).source_points) > 1.5 * SgorConfig().quick_keypoints
+
+    def right(result):
+        return result.inliers.mean()
+    assert right(run(match_within_labels=False)) < right(default)
+    assert right(run(context_weight=0.0)) < right(default)
+
+    assert default.covariance is not None
+    assert run(local_refinement=False).covariance is None
+
+    noisy = [half_random(scan, i) for i, scan in enumerate(scans[:2])]
+    kept = [register(*noisy, SgorConfig(semantics=kind, match_within_labels=False)).hypotheses
+            for kind in ('loose', 'hard', 'none')]
+    assert not np.array_equal(kept[0], kept[1])
+    assert not np.array_equal(kept[0], kept[2])
+    assert not np.array_equal(kept[1], kept[2])
+
+
+def test_confidence_decides(prepared):
+    """The threshold refuses, and the reason names it; the candidate is still there to look at."""
+    result = register(prepared[1], prepared[0], SgorConfig(min_confidence=1.0))
+    assert_refused(result)
+    assert 'min_confidence 1.00' in result.reason
+    assert result.T_target_source is not None
+    assert register(prepared[1], prepared[0], SgorConfig(min_inliers=10000)).reason.endswith(
+        'min_inliers is 10000')
+
+
+@pytest.mark.parametrize('labels', [True, False])
+def test_another_place_is_refused(scans, elsewhere, labels):
+    for scan, (points, ids, _) in zip(scans[:2], elsewhere[:2], strict=True):
+        pair = ((scan, SemanticScan(points, ids)) if labels else
+                (SemanticScan(scan.points), SemanticScan(points)))
+        for source, target in (pair, pair[::-1]):
+            assert_refused(register(source, target))
+
+
+@pytest.mark.parametrize('seed', range(3))
+def test_random_points_are_refused(prepared, seed):
+    """With labels of a street and none of its shapes, in both directions."""
+    rng = np.random.default_rng(seed)
+    points = rng.uniform([-40, -40, -2], [40, 40, 8], (20000, 3))
+    noise = preprocess(SemanticScan(points, rng.choice(prepared[0].scan.labels, 20000)))
+    assert_refused(register(noise, prepared[0]))
+    assert_refused(register(prepared[0], noise))
+
+
+@pytest.mark.parametrize('points', [[[5, 0, 0]], [[5, 0, 0]] * 1000, [[0, 0, 0]], pytest.param(
+    [[5, i, 0] for i in range(5)], marks=pytest.mark.xfail(
+        strict=True, reason='several matches on one target point count as several inliers'))])
+def test_scans_of_next_to_nothing_are_refused(prepared, points):
+    """One point, one point often, the sensor itself, a line: a reason and no exception."""
+    little = SemanticScan(points, np.full(len(points), 50))
+    for source, target in ((little, prepared[0]), (prepared[0], little), (little, little)):
+        assert_refused(register(source, target))
