@@ -6,10 +6,10 @@ from scipy.spatial.transform import Rotation
 
 from sgor_ros import register_correspondences
 from sgor_ros import SgorConfig
-from sgor_ros.core.consistency import consistency_graph
 from sgor_ros.core.consistency import label_agreement
 from sgor_ros.core.consistency import seed_rows
 from sgor_ros.core.correspondences import Correspondences
+from sgor_ros.core.graph import consistency_graph
 from sgor_ros.core.grouping import group
 from sgor_ros.core.grouping import leading_eigenvector
 

@@ -4,7 +4,7 @@ import pytest
 from test_consistency import random_matches
 
 from sgor_ros import SgorConfig
-from sgor_ros.core.consistency import consistency_graph
+from sgor_ros.core.graph import consistency_graph
 from sgor_ros.core.grouping import group
 from sgor_ros.core.grouping import leading_eigenvector
 

@@ -1,6 +1,5 @@
 """Correspondence grouping: keys by spectral matching, kNN groups (Sec. III-B)."""
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numba
 import numpy as np
@@ -8,9 +7,7 @@ from numpy.typing import NDArray
 
 from .config import SgorConfig
 from .correspondences import Correspondences
-
-if TYPE_CHECKING:
-    from .consistency import ConsistencyGraph
+from .graph import ConsistencyGraph
 
 POWER_ITERATIONS = 10
 """As PointDSC; the order of the keys has settled by then."""
@@ -32,7 +29,7 @@ class Groups:
     members: NDArray[np.int64]
 
 
-def group(correspondences: Correspondences, graph: 'ConsistencyGraph',
+def group(correspondences: Correspondences, graph: ConsistencyGraph,
           config: SgorConfig) -> Groups:
     """Choose keys by spectral matching and gather the k nearest correspondences of each."""
     score = leading_eigenvector(graph)
@@ -43,7 +40,7 @@ def group(correspondences: Correspondences, graph: 'ConsistencyGraph',
     return Groups(keys, _nearest(correspondences.source, keys, k))
 
 
-def leading_eigenvector(graph: 'ConsistencyGraph') -> NDArray[np.float32]:
+def leading_eigenvector(graph: ConsistencyGraph) -> NDArray[np.float32]:
     """Return the leading eigenvector of the consistent weights: spectral matching's confidence.
 
     Returns

@@ -72,10 +72,6 @@ class LabelConvention:
         unknown = ids[~known[rows]]
         return table[rows], ~dropped[rows], np.unique(unknown).tolist() if unknown.size else []
 
-    def class_name(self, class_id: int) -> str:
-        """Return the name of a class inside."""
-        return self.names.get(class_id, f'class {class_id}')
-
     @cached_property
     def _tables(self) -> tuple[NDArray[np.uint8], NDArray[np.bool_], NDArray[np.bool_]]:
         size = max([*self.classes, *self.drop]) + 2

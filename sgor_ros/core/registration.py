@@ -9,7 +9,6 @@ from .acceptance import judge
 from .acceptance import judge_matches
 from .alignment import align
 from .config import SgorConfig
-from .consistency import consistency_graph
 from .consistency import label_agreement
 from .consistency import seed_rows
 from .correspondences import Correspondences
@@ -17,6 +16,7 @@ from .correspondences import given_correspondences
 from .correspondences import match
 from .correspondences import overlap_region
 from .evidence import View
+from .graph import consistency_graph
 from .grouping import group
 from .hypotheses import hypothesise
 from .hypotheses import MIN_POINTS

@@ -28,8 +28,3 @@ def compose(R: Array, t: Array) -> Array:
 def angle(R: Array) -> float:
     """Return the angle of a (3, 3) rotation, radians in [0, pi]."""
     return float(Rotation.from_matrix(R).magnitude())
-
-
-def angle_between(a: Array, b: Array) -> float:
-    """Return the angle between two directions, radians in [0, pi]."""
-    return float(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b))

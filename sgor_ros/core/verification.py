@@ -74,6 +74,15 @@ def ground_angles(T: NDArray[np.float64], source_normal: NDArray[np.float64],
                       moved @ target_normal)
 
 
+@numba.njit(cache=True, nogil=True, inline='always')
+def _squared_distance(T, p, q):  # type: ignore[no-untyped-def]
+    squared = 0.0
+    for a in range(3):
+        gap = T[a, 0] * p[0] + T[a, 1] * p[1] + T[a, 2] * p[2] + T[a, 3] - q[a]
+        squared += gap * gap
+    return squared
+
+
 @numba.njit(cache=True, nogil=True, parallel=True, fastmath=True)
 def truncated_distance(T, source, target, sigma_d):  # type: ignore[no-untyped-def]
     """Return the mean of TD over (N, 3) matches for each of (H, 4, 4) (Eq. 18 and 19), metres."""
@@ -81,11 +90,7 @@ def truncated_distance(T, source, target, sigma_d):  # type: ignore[no-untyped-d
     for h in numba.prange(len(T)):
         total = 0.0
         for i in range(len(source)):
-            squared = 0.0
-            for a in range(3):
-                gap = (T[h, a, 0] * source[i, 0] + T[h, a, 1] * source[i, 1]
-                       + T[h, a, 2] * source[i, 2] + T[h, a, 3] - target[i, a])
-                squared += gap * gap
+            squared = _squared_distance(T[h], source[i], target[i])
             total += min(max(np.sqrt(squared), 0.5 * sigma_d), 2.5 * sigma_d)
         cost[h] = total / len(source)
     return cost
@@ -97,10 +102,5 @@ def near_counts(T, source, target, reach):  # type: ignore[no-untyped-def]
     counts = np.zeros(len(T), np.int64)
     for h in numba.prange(len(T)):
         for i in range(len(source)):
-            squared = 0.0
-            for a in range(3):
-                gap = (T[h, a, 0] * source[i, 0] + T[h, a, 1] * source[i, 1]
-                       + T[h, a, 2] * source[i, 2] + T[h, a, 3] - target[i, a])
-                squared += gap * gap
-            counts[h] += squared < reach * reach
+            counts[h] += _squared_distance(T[h], source[i], target[i]) < reach * reach
     return counts
