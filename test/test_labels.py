@@ -58,7 +58,7 @@ def test_the_same_thing_is_the_same_class_in_all_conventions(raw, train, nuscene
     found = {decode(name, [i])[0][0] for name, i in (
         ('semantickitti', raw), ('semantickitti_train', train), ('nuscenes', nuscenes))}
     assert len(found) == 1
-    names = {label_convention(name).class_name(next(iter(found))) for name in CONVENTIONS}
+    names = {label_convention(name).names[next(iter(found))] for name in CONVENTIONS}
     assert len(names) == 1
 
 
@@ -85,7 +85,7 @@ def test_raw_ids_agree_with_the_table_of_semantickitti(data_folder):
         assert keep == (table['labels'][raw] != 'outlier')
         if 0 < inside <= 19:
             assert inside == expected
-            assert convention.class_name(inside) == table['labels'][
+            assert convention.names[inside] == table['labels'][
                 table['learning_map_inv'][expected]]
         elif table['labels'][raw].startswith('moving'):
             assert inside in convention.movable
@@ -153,7 +153,7 @@ def test_a_table_of_the_user(tmp_path):
     assert decode(str(path), [3, 4, 5, 7, 3 | 0x500]) == (
         [9, 13, 6, 0, 9], [True, True, True, False, True], [])
     assert (convention.ground, convention.movable) == ({9}, {6})
-    assert convention.class_name(13) == 'wall'
+    assert convention.names[13] == 'wall'
     assert decode(str(path), [8])[2] == [8]
 
 
