@@ -179,7 +179,7 @@ ABLATIONS = {
     'matching across labels': {'match_within_labels': False},
     'matching across heights': {'height_gate': 0.0},
     'without context': {'context_weight': 0.0},
-    'one attempt': {'quick_keypoints': 0},
+    'one attempt': {'quick_keypoints': 0, 'max_correspondences': 1600},
     'truncated distance': {'cloud_check': False},
     'without local refinement': {'local_refinement': False},
     'movers vote': {'moving_vote': True},
@@ -226,7 +226,8 @@ def test_ablations_change_what_they_say(scans):
     assert np.abs(heights(free, 'source') - heights(free, 'target')).max() > 1.0
 
     assert len(default.source_points) <= SgorConfig().quick_keypoints
-    assert len(run(quick_keypoints=0).source_points) > 1.5 * SgorConfig().quick_keypoints
+    once = run(quick_keypoints=0, max_correspondences=1600)
+    assert len(once.source_points) > 1.5 * SgorConfig().quick_keypoints
 
     def right(result):
         return result.inliers.mean()
@@ -246,12 +247,14 @@ def test_ablations_change_what_they_say(scans):
 
 def test_confidence_decides(prepared):
     """The threshold refuses, and the reason names it; the candidate is still there to look at."""
-    result = register(prepared[1], prepared[0], SgorConfig(min_confidence=1.0))
+    few = SgorConfig(max_correspondences=1000)
+    result = register(prepared[1], prepared[0], few.replace(min_confidence=1.0))
     assert_refused(result)
     assert 'min_confidence 1.00' in result.reason
     assert result.T_target_source is not None
-    assert register(prepared[1], prepared[0], SgorConfig(min_inliers=10000)).reason.endswith(
-        'min_inliers is 10000')
+    result = register(prepared[1], prepared[0], few.replace(min_inliers=10000))
+    assert_refused(result)
+    assert result.reason == f'only {result.inliers.sum()} inliers, min_inliers is 10000'
 
 
 @pytest.mark.parametrize('labels', [True, False])

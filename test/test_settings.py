@@ -79,7 +79,7 @@ def test_unknown_names_are_refused():
     ({'normal_radius': 4.0}, ('normal_radius = 4.0', 'descriptor_radius = 3.5')),
     ({'vote_radius': 4.0}, ('vote_radius = 4.0', 'descriptor_radius = 3.5')),
     ({'descriptor_radius': 1.2}, ('normal_radius = 1.5', 'descriptor_radius = 1.2')),
-    ({'group_size': 20}, ('group_keep = 20', 'group_size = 20')),
+    ({'group_size': 20, 'group_keep': 20}, ('group_keep = 20', 'group_size = 20')),
 ])
 def test_fields_that_do_not_fit_each_other(values, words):
     """The message names both fields and both values."""

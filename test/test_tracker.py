@@ -286,7 +286,7 @@ def test_settings_change_between_scans_without_losing_the_track(scans, street):
     assert second.reference_stamp_ns == 0
     assert len(second.registration.source_points) <= 300 < len(first.registration.source_points)
     assert_near(second.T_odom_sensor, relative(street[0][2], street[2][2]))
-    tracker.config = tracker.config.replace(min_confidence=1.0)
+    tracker.config = tracker.config.replace(min_confidence=1.0, max_correspondences=300)
     refused = tracker.track(scans[3], 3 * PERIOD_NS)
     assert 'min_confidence 1.00' in refused.reason
     tracker.config = SgorConfig()
