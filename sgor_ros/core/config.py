@@ -33,7 +33,7 @@ class SgorConfig(Settings):
     secondary_ground: bool = setting(
         True, 'Segment the ground a second time by distance; false: by labels only (ablation 3)')
     robust_ground: bool = setting(
-        True, 'Fit the ground plane in narrowing bands, nearest the sensor; false: as printed')
+        True, 'Find the ground plane by consensus near the sensor; false: fit as printed')
     ground_radius: float = setting(
         25.0, 'Horizontal reach of the ground plane fit when robust_ground is on', 'm',
         minimum=1.0, maximum=1000.0)
@@ -60,6 +60,9 @@ class SgorConfig(Settings):
         40, 'Groups of the first attempt', minimum=1, maximum=5000)
     match_within_labels: bool = setting(
         True, 'Match only points of the same regional label (beyond the paper)')
+    unlabelled_attempt: bool = setting(
+        True, 'Match what is refused once more by geometry alone: labels may be wrong '
+        '(beyond the paper)')
     height_gate: float = setting(
         0.5, 'Match only points whose heights over the ground differ by less; 0: off '
         '(beyond the paper)', 'm', minimum=0.0, maximum=20.0)
@@ -151,6 +154,6 @@ class SgorConfig(Settings):
         """Return the paper's steps and nothing besides."""
         return cls(
             robust_ground=False, drop_ground_labels=False, match_within_labels=False,
-            height_gate=0.0, context_weight=0.0, moving_vote=True, quick_keypoints=0, groups=200,
-            group_size=400, weight_cutoff=6.0, cloud_check=False, refinement_rounds=1,
-            local_refinement=False, min_confidence=0.0)
+            unlabelled_attempt=False, height_gate=0.0, context_weight=0.0, moving_vote=True,
+            quick_keypoints=0, groups=200, group_size=400, weight_cutoff=6.0, cloud_check=False,
+            refinement_rounds=1, local_refinement=False, min_confidence=0.0)

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .config import SgorConfig
+from .features import unit_rows
 from .ground import Ground
 from .labels import LabelConvention
 from .labels import UNLABELLED
@@ -44,8 +45,8 @@ def semantic_context(points: NDArray[np.float64], labels: NDArray[np.uint8], gro
 
     Returns
     -------
-    (V, 3 * len(classes)) float32
-        Unit rows.
+    (V, 3 + 3 * len(classes)) float32
+        Whatever class it is, then each class; unit rows, the first three columns apart.
     """
     cell = config.context_scale / 1.5
     across = np.linalg.svd(ground.normal[None])[2][1:]    # two axes in the ground plane
@@ -55,24 +56,23 @@ def semantic_context(points: NDArray[np.float64], labels: NDArray[np.uint8], gro
     shape = xy.max(axis=0, initial=0) + reach + 1
     present = [c for c in classes if (labels == c).any()]
     column = np.full(256, -1, np.int64)
-    column[present] = np.arange(len(present))
+    column[present] = 1 + np.arange(len(present))
     places, of_point = np.unique(xy[:, 0] * shape[1] + xy[:, 1], return_inverse=True)
-    occupied = np.zeros((len(places), len(present)), np.bool_)
+    occupied = np.zeros((len(places), 1 + len(present)), np.bool_)
+    occupied[:, 0] = True
     seen = column[labels] >= 0
     occupied[of_point[seen], column[labels[seen]]] = True
-    context = np.zeros((len(places), OCTAVES, len(classes)), np.float32)
-    columns = [classes.index(c) for c in present]
+    context = np.zeros((len(places), 1 + len(classes), OCTAVES), np.float32)
+    columns = [0, *(1 + classes.index(c) for c in present)]
     for octave in range(OCTAVES):
         sigma = config.context_scale * 2**octave / cell
         taps = np.arange(-math.ceil(TRUNCATE * sigma), math.ceil(TRUNCATE * sigma) + 1)
         kernel = np.exp(-0.5 * (taps / sigma)**2).astype(np.float32)
         kernel *= np.sqrt(sigma) / kernel.sum()    # far scales are thinner: keep their say
-        context[:, octave, columns] = _blur(places // shape[1], places % shape[1], occupied,
+        context[:, columns, octave] = _blur(places // shape[1], places % shape[1], occupied,
                                             kernel, shape[0], shape[1])
-    flat = np.sqrt(context.reshape(len(places), OCTAVES * len(classes)))
-    length = np.linalg.norm(flat, axis=1, keepdims=True)
-    unit = np.divide(flat, length, out=np.zeros_like(flat), where=length > 0)
-    return unit[of_point]
+    flat = np.sqrt(context.reshape(len(places), OCTAVES * (1 + len(classes))))
+    return np.hstack((unit_rows(flat[:, :OCTAVES]), unit_rows(flat[:, OCTAVES:])))[of_point]
 
 
 @numba.njit(cache=True, nogil=True, parallel=True, fastmath=True)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from .checks import as_labels
 from .checks import finite_points
 from .config import SgorConfig
+from .context import OCTAVES
 from .features import regional_labels
 from .labels import label_convention
 from .labels import LabelConvention
@@ -58,7 +59,7 @@ class Features:
     heights : (V,) float64 or None
         Heights over the ground plane, metres; None without a ground plane.
     context : (V, E) float32 or None
-        Semantic context, unit rows; None without a ground plane or where it is off.
+        From `context.semantic_context`; None without a ground plane or where it is off.
     """
 
     points: NDArray[np.float64]
@@ -131,12 +132,13 @@ def match(source: Features, target: Features, config: SgorConfig) -> Corresponde
     else:
         source_heights, target_heights = source.heights, target.heights
     gate = config.height_gate if config.height_gate > 0 else np.inf
-    block = target.regional if config.match_within_labels else np.zeros_like(target.regional)
-    wanted = source.regional if config.match_within_labels else np.zeros_like(source.regional)
+    within = config.match_within_labels and config.semantics != 'none'
+    block = target.regional if within else np.zeros_like(target.regional)
+    wanted = source.regional if within else np.zeros_like(source.regional)
     # sorted by label, then height, the candidates of a point stand in one run
     order = np.lexsort((target_heights, block))
     sorted_block, sorted_heights = block[order], target_heights[order]
-    described, candidates = _joint_descriptors(source, target, config.context_weight)
+    described, candidates = _joint_descriptors(source, target, config)
     first, last = np.zeros(len(source.points), np.int64), np.zeros(len(source.points), np.int64)
     for label in np.unique(wanted):
         low, high = np.searchsorted(sorted_block, [label, int(label) + 1])
@@ -157,14 +159,16 @@ def thin(count: int, most: int) -> NDArray[np.intp]:
     return np.linspace(0, count - 1, most).astype(np.intp)
 
 
-def _joint_descriptors(source: Features, target: Features, context_weight: float
+def _joint_descriptors(source: Features, target: Features, config: SgorConfig
                        ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Append the weighted context columns that are not empty, where both scans have any."""
     p, q = source.context, target.context
     if p is None or q is None or p.shape[1] != q.shape[1]:
         return source.descriptors, target.descriptors
     used = p.any(axis=0) & q.any(axis=0)
-    weight = np.float32(context_weight)
+    by_class = np.arange(used.size) >= OCTAVES
+    used &= ~by_class if config.semantics == 'none' else by_class
+    weight = np.float32(config.context_weight)
     return (np.hstack((source.descriptors, weight * p[:, used])),
             np.hstack((target.descriptors, weight * q[:, used])))
 

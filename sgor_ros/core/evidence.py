@@ -54,7 +54,7 @@ class View:
 
 @dataclass(frozen=True)
 class Evidence:
-    """Shares of the keypoints, mean of both directions.
+    """Shares of the keypoints of both scans together.
 
     Attributes
     ----------
@@ -90,7 +90,8 @@ def evidence(source: View, target: View, T_target_source: NDArray[np.float64],
     """
     forth = _testify(source, target, T_target_source[None], reach, None)[0]
     back = _testify(target, source, se3.inverse(T_target_source)[None], reach, None)[0]
-    agree, contradict = (forth + back) / 2
+    asked = max(len(source.points) + len(target.points), 1)
+    agree, contradict = (forth * len(source.points) + back * len(target.points)) / asked
     return Evidence(float(agree), float(contradict))
 
 

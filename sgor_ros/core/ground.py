@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from .config import SgorConfig
 from .voxels import VoxelCloud
 
-GEOMETRY_TRIALS = 300
-GEOMETRY_SEED = 0
+TRIALS, SAMPLE, SEED = 200, 1000, 0
+"""Planes tried by RANSAC, and points asked about each."""
 
 
 @dataclass(frozen=True)
@@ -71,50 +71,53 @@ def fit_plane(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
 
 def _by_labels(points: NDArray[np.float64], by_label: NDArray[np.bool_],
                config: SgorConfig) -> Ground | None:
+    if config.robust_ground and config.secondary_ground:
+        # wrong labels and far slopes would tilt the first plane
+        near = np.linalg.norm(points, axis=1) < config.ground_radius
+        seed = by_label & near if (by_label & near).sum() >= config.min_ground_points else by_label
+        return _by_consensus(points, points[seed], 'labels', config)
     normal, offset = fit_plane(points[by_label])
     if not config.secondary_ground:
         return Ground(normal, offset, by_label, 'labels')
     near = np.abs(points @ normal + offset) < config.sigma_g
-    if config.robust_ground:
-        # wrong labels lift the first plane: let the points near it, then nearer, decide
-        seed = by_label & (np.linalg.norm(points[:, :2], axis=1) < config.ground_radius)
-        if seed.sum() >= config.min_ground_points:
-            by_label = seed
-        for band in (4.0, 2.0, 1.0):
-            near = by_label & (np.abs(points @ normal + offset) < band * config.sigma_g)
-            if near.sum() < config.min_ground_points:
-                break
-            normal, offset = fit_plane(points[near])
-        near = np.abs(points @ normal + offset) < config.sigma_g
     if near.sum() < config.min_ground_points:
         return None
-    if not config.robust_ground:
-        normal, offset = fit_plane(points[near])
+    normal, offset = fit_plane(points[near])
     return Ground(normal, offset, near, 'labels')
 
 
 def _by_geometry(points: NDArray[np.float64], config: SgorConfig) -> Ground | None:
-    """Find the plane through most points that has next to nothing below it (RANSAC)."""
     near = points[np.linalg.norm(points, axis=1) < config.ground_radius]
     if len(near) < config.min_ground_points:
         return None
-    rng = np.random.default_rng(GEOMETRY_SEED)
-    corners = near[rng.integers(len(near), size=(GEOMETRY_TRIALS, 3))]
+    return _by_consensus(points, near, 'geometry', config)
+
+
+def _by_consensus(points: NDArray[np.float64], candidates: NDArray[np.float64],
+                  source: Literal['labels', 'geometry'], config: SgorConfig) -> Ground | None:
+    """Find the plane through most candidates that has next to nothing below it (RANSAC)."""
+    rng = np.random.default_rng(SEED)
+    corners = candidates[rng.integers(len(candidates), size=(TRIALS, 3))]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     length = np.linalg.norm(normals, axis=1, keepdims=True)
     normals = np.divide(normals, length, out=np.zeros_like(normals), where=length > 0)
     offsets = -np.einsum('ij,ij->i', normals, corners[:, 0])
     flip = offsets < 0
     normals[flip], offsets[flip] = -normals[flip], -offsets[flip]
-    heights = near @ normals.T + offsets
+    sample = candidates[::max(len(candidates) // SAMPLE, 1)]
+    heights = sample @ normals.T + offsets
     # what lies below a wall or a table plane tells it from the ground
     score = ((np.abs(heights) < config.sigma_g).sum(axis=0)
              - 3 * (heights < -2 * config.sigma_g).sum(axis=0))
     score[length[:, 0] == 0] = 0
     best = int(np.argmax(score))
-    if score[best] < config.min_ground_points:
-        return None
     normal, offset = normals[best], float(offsets[best])
+    near = np.abs(candidates @ normal + offset) < config.sigma_g
+    if score[best] <= 0 or near.sum() < config.min_ground_points:
+        return None
     for _ in range(2):
-        normal, offset = fit_plane(near[np.abs(near @ normal + offset) < config.sigma_g])
-    return Ground(normal, offset, np.abs(points @ normal + offset) < config.sigma_g, 'geometry')
+        normal, offset = fit_plane(candidates[near])
+        near = np.abs(candidates @ normal + offset) < config.sigma_g
+        if near.sum() < config.min_ground_points:
+            return None
+    return Ground(normal, offset, np.abs(points @ normal + offset) < config.sigma_g, source)

@@ -11,6 +11,8 @@ from .graph import ConsistencyGraph
 
 POWER_ITERATIONS = 10
 """As PointDSC; the order of the keys has settled by then."""
+MOST_VISITS, FEWEST_GROUPS = 1e8, 20
+"""Edges to visit for all seed rows, some tenths of a second; and the groups that remain."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,7 +22,7 @@ class Groups:
     Attributes
     ----------
     keys : (L,) int64
-        Key correspondences G^k, the strongest first.
+        Key correspondences G^k, the strongest first; fewer than asked for in a dense graph.
     members : (L, k) int64
         Correspondences nearest to each key on the source, the key among them, in no order.
     """
@@ -36,6 +38,9 @@ def group(correspondences: Correspondences, graph: ConsistencyGraph,
     order = np.argsort(-score, kind='stable')
     keys = _spread(correspondences.source, order, min(config.groups, len(order)),
                    config.key_spacing)
+    # where most matches are right, rows are long and few groups do
+    visits = np.cumsum((graph.inner - graph.start[:-1])[keys].astype(np.float64)**2)
+    keys = keys[:max(int(np.searchsorted(visits, MOST_VISITS)), FEWEST_GROUPS)]
     k = min(config.group_size, len(correspondences))
     return Groups(keys, _nearest(correspondences.source, keys, k))
 

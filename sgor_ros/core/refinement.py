@@ -31,3 +31,17 @@ def distances(T_target_source: NDArray[np.float64], source: NDArray[np.float64],
     residual: NDArray[np.float64] = np.linalg.norm(
         se3.transform(T_target_source, source) - target, axis=1)
     return residual
+
+
+def unobservable(source: NDArray[np.float64], target: NDArray[np.float64],
+                 config: SgorConfig) -> str:
+    """Return why (K, 3) inliers do not hold a transformation, in words; empty where they do."""
+    # several matches may end at the same point
+    distinct = min(len(np.unique(points, axis=0)) for points in (source, target))
+    if distinct < config.min_inliers:
+        return f'only {distinct} inliers, min_inliers is {config.min_inliers}'
+    for points in (source, target):
+        across = np.sqrt(np.linalg.eigvalsh(np.cov(points.T))[1])
+        if across < config.sigma_d / 4:
+            return f'all inliers lie on a line, {across:.3f} m wide'
+    return ''

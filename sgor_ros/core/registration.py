@@ -23,6 +23,7 @@ from .hypotheses import MIN_POINTS
 from .preprocessing import preprocess
 from .refinement import distances
 from .refinement import refine
+from .refinement import unobservable
 from .scan import PreparedScan
 from .scan import Registration
 from .scan import SemanticScan
@@ -57,6 +58,8 @@ def register(source: SemanticScan | PreparedScan, target: SemanticScan | Prepare
     with clock('preprocessing'):
         source = source if isinstance(source, PreparedScan) else preprocess(source, config)
         target = target if isinstance(target, PreparedScan) else preprocess(target, config)
+    if (source.scan.labels is None) != (target.scan.labels is None):
+        source, target = _without_labels(source), _without_labels(target)
     for attempt in _attempts(config):
         result = _globally(source, target, attempt, clock)
         if result.success:
@@ -68,13 +71,23 @@ def register(source: SemanticScan | PreparedScan, target: SemanticScan | Prepare
                              *(f'target: {w}' for w in target.warnings)))
 
 
+def _without_labels(prepared: PreparedScan) -> PreparedScan:
+    """Prepare a scan again without the labels that the other scan has not."""
+    if prepared.scan.labels is None:
+        return prepared
+    again = preprocess(SemanticScan(prepared.scan.points), prepared.config)
+    return replace(again, warnings=('labels ignored: the other scan has none', *again.warnings))
+
+
 def _attempts(config: SgorConfig) -> Iterator[SgorConfig]:
-    """Yield the settings of a quick attempt with few keypoints, then those of all."""
+    """Yield the settings of a quick attempt with few keypoints, of all, and without labels."""
     if 0 < config.quick_keypoints < config.max_correspondences:
         yield config.replace(max_correspondences=config.quick_keypoints,
                              groups=min(config.groups, config.quick_groups),
                              group_size=max(config.quick_keypoints // 8, config.group_keep + 1))
     yield config
+    if config.unlabelled_attempt and config.semantics != 'none':
+        yield config.replace(semantics='none')
 
 
 def _globally(source: PreparedScan, target: PreparedScan, config: SgorConfig,
@@ -82,7 +95,7 @@ def _globally(source: PreparedScan, target: PreparedScan, config: SgorConfig,
     """Match, solve, and ask the clouds whether to believe it (Sec. III-B to III-E)."""
     with clock('matching'):
         p, q = source.features, target.features
-        if config.correspondence_preprocessing:
+        if config.correspondence_preprocessing and config.semantics != 'none':
             p, q = overlap_region(p, q)
         correspondences = match(p, q, config)
     normals = (None if source.ground is None or target.ground is None
@@ -162,7 +175,7 @@ def solve(correspondences: Correspondences, ground_normals: Normals | None,
     with clock('refinement'):
         T = refine(hypotheses.T_target_source[verdict.best], correspondences, config)
         agree = distances(T, correspondences.source, correspondences.target) < config.tau_1
-    if agree.sum() < config.min_inliers:
-        return replace(found, T_target_source=T, inliers=agree,
-                       reason=f'only {agree.sum()} inliers, min_inliers is {config.min_inliers}')
+    reason = unobservable(correspondences.source[agree], correspondences.target[agree], config)
+    if reason:
+        return replace(found, reason=reason, inliers=agree)
     return replace(found, success=True, T_target_source=T, inliers=agree)

@@ -7,6 +7,8 @@ from typing import Any
 from typing import cast
 from typing import Self
 
+import numpy as np
+
 Value = bool | int | float | str
 
 
@@ -67,7 +69,8 @@ class Setting:
         InputError
             Wrong type, not finite, out of bounds, or not one of the choices.
         """
-        value = float(given) if self.kind is float and type(given) is int else given
+        plain = given.item() if isinstance(given, np.generic) else given
+        value = float(plain) if self.kind is float and type(plain) is int else plain
         if type(value) is not self.kind or not isinstance(value, bool | int | float | str):
             raise InputError(f'{self.name} = {value!r}: expected {self.kind.__name__}, '
                              f'got {type(value).__name__}')
