@@ -57,7 +57,7 @@ class SgorConfig(Settings):
         1000, 'Keypoints of a first attempt; all are matched only when that is refused. 0: no '
         'first attempt (beyond the paper)', minimum=0, maximum=50000)
     quick_groups: int = setting(
-        40, 'Groups of the first attempt', minimum=1, maximum=5000)
+        25, 'Groups of the first attempt', minimum=1, maximum=5000)
     match_within_labels: bool = setting(
         True, 'Match only points of the same regional label (beyond the paper)')
     unlabelled_attempt: bool = setting(
