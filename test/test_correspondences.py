@@ -20,22 +20,27 @@ def features(n, seed, columns=33):
     """Return n random keypoints of three classes with heights and context."""
     rng = np.random.default_rng(seed)
     descriptors, context = rng.random((n, columns)), rng.random((n, 12))
-    context[:, 3] = 0 if seed else 0.7    # a class that only the first scan has
+    context[:, 3] = 0 if seed else 0.7    # of a class that only the first scan has
+    for part in (context[:, :3], context[:, 3:]):
+        part /= np.linalg.norm(part, axis=1, keepdims=True)
     return Features(
         rng.uniform(-30, 30, (n, 3)), *rng.choice([0, 13, 15, 18], (2, n)).astype(np.uint8),
         *(np.float32(a / np.linalg.norm(a, axis=1, keepdims=True))[:n] for a in (descriptors,)),
-        rng.uniform(0, 4, n), np.float32(context / np.linalg.norm(context, axis=1, keepdims=True)))
+        rng.uniform(0, 4, n), np.float32(context))
 
 
 def brute_force(source, target, config):
     """Return pairs (i, j) of nearest joint descriptors among the candidates allowed."""
     gap = np.linalg.norm(source.descriptors[:, None] - target.descriptors[None], axis=-1)**2
     if config.context_weight > 0:
-        used = source.context.any(axis=0) & target.context.any(axis=0)
+        # empty in one scan does not count; whatever class it is only without semantics
+        columns = slice(3) if config.semantics == 'none' else slice(3, None)
+        p, q = source.context[:, columns], target.context[:, columns]
+        used = p.any(axis=0) & q.any(axis=0)
         gap += config.context_weight**2 * np.linalg.norm(
-            source.context[:, None, used] - target.context[None][..., used], axis=-1)**2
+            p[:, None, used] - q[None][..., used], axis=-1)**2
     allowed = np.ones(gap.shape, bool)
-    if config.match_within_labels:
+    if config.match_within_labels and config.semantics != 'none':
         allowed &= source.regional[:, None] == target.regional[None]
     if config.height_gate > 0:
         allowed &= np.abs(source.heights[:, None] - target.heights[None]) <= config.height_gate
@@ -46,10 +51,12 @@ def brute_force(source, target, config):
 @pytest.mark.parametrize('labels', [True, False])
 @pytest.mark.parametrize('gate', [0.0, 0.05])
 @pytest.mark.parametrize('context', [0.0, 1.5])
-def test_matches_equal_brute_force(labels, gate, context):
+@pytest.mark.parametrize('semantics', [SgorConfig().semantics, 'none'])
+def test_matches_equal_brute_force(labels, gate, context, semantics):
     """Each restriction alone and all together; points and both labels come along."""
     source, target = features(300, 0), features(400, 1)
-    config = SgorConfig(match_within_labels=labels, height_gate=gate, context_weight=context)
+    config = SgorConfig(match_within_labels=labels, height_gate=gate, context_weight=context,
+                        semantics=semantics)
     found = match(source, target, config)
     pairs = brute_force(source, target, config)
     assert 0 < len(pairs) <= 300
@@ -60,6 +67,23 @@ def test_matches_equal_brute_force(labels, gate, context):
     np.testing.assert_array_equal(found.target_labels, target.labels[j])
     np.testing.assert_array_equal(found.source_regional, source.regional[i])
     np.testing.assert_array_equal(found.target_regional, target.regional[j])
+
+
+def test_without_semantics_labels_do_not_count():
+    """Neither regional labels nor the columns of classes change a match; the others do."""
+    source, target = features(300, 0), features(400, 1)
+    config = SgorConfig(semantics='none', match_within_labels=True, height_gate=0.0,
+                        context_weight=1.5)
+    plain = match(source, target, config).target
+    assert len(plain) == 300
+    mixed = target.context.copy()
+    mixed[:, 3:] = mixed[::-1, 3:]
+    other = replace(target, regional=target.regional[::-1].copy(), context=mixed)
+    np.testing.assert_array_equal(match(source, other, config).target, plain)
+    mixed = target.context.copy()
+    mixed[:, :3] = mixed[::-1, :3]
+    other = replace(target, context=mixed)
+    assert (match(source, other, config).target != plain).any(axis=1).mean() > 0.5
 
 
 def test_keypoints_without_a_candidate_have_no_match():
