@@ -45,11 +45,11 @@ def asked(wall, points, labels, T=None):
     ((5, 1.5, 0), 0, 1),        # towards the second keypoint
 ])
 def test_one_point_by_hand(wall, point, agree, contradict):
-    """The wall's own two keypoints agree with half their weight when one has a partner."""
+    """Three are asked: the point and the wall's own two, of which one has a partner or none."""
     found = asked(wall, [point], [WALL])
-    back = 0.5 if agree else 0.0
-    assert found.agree == pytest.approx((agree + back) / 2)
-    assert found.contradict == pytest.approx(contradict / 2)
+    back = 1 if agree else 0
+    assert found.agree == pytest.approx((agree + back) / 3)
+    assert found.contradict == pytest.approx(contradict / 3)
 
 
 def test_a_point_of_another_label_neither_agrees_nor_contradicts(wall):
@@ -62,9 +62,20 @@ def test_shares_by_hand(wall):
     """Six points: two agree, one contradicts; back, both keypoints of the wall agree."""
     points = [[10, 0, 0], [10, 3, 0.5], [4, 0, 0], [15, 0, 0], [-5, 0, 0], [10, 0, 0.2]]
     found = asked(wall, points, [WALL, WALL, WALL, WALL, WALL, POLE])
-    assert found.agree == pytest.approx((2 / 6 + 1) / 2)
-    assert found.contradict == pytest.approx((1 / 6 + 0) / 2)
-    assert 0.8 < found.confidence < found.agree / (found.agree + found.contradict) + 1e-9
+    assert found.agree == pytest.approx((2 + 2) / (6 + 2))
+    assert found.contradict == pytest.approx((1 + 0) / (6 + 2))
+    assert found.confidence == pytest.approx(0.5 / (0.5 + 0.125 + 0.01))
+
+
+def test_a_handful_cannot_make_many_confident(wall):
+    """Both points of the wall agree, two of 998 do, nobody contradicts: 4 of 1000."""
+    hidden = np.random.default_rng(0).uniform([15, -1, -1], [20, 1, 1], (996, 3))
+    many = view(NOTHING_SEEN, keypoints([[10, 0, 0.3], [10, 3, 0.3], *hidden], [WALL] * 998), CELL)
+    for pair in ((many, wall), (wall, many)):
+        found = evidence(*pair, np.eye(4), REACH)
+        assert found.agree == pytest.approx(0.004)
+        assert found.contradict == 0
+        assert found.confidence == pytest.approx(0.004 / (0.004 + 0.01))
 
 
 def test_the_transformation_moves_the_source(wall):
@@ -72,7 +83,7 @@ def test_the_transformation_moves_the_source(wall):
     T = np.eye(4)
     T[:3, :3] = Rotation.from_euler('z', 90, degrees=True).as_matrix()
     T[:3, 3] = 6, 0, 0
-    assert asked(wall, [[0, -4, 0]], [WALL], T).agree == pytest.approx(0.75)
+    assert asked(wall, [[0, -4, 0]], [WALL], T).agree == pytest.approx(2 / 3)
     assert asked(wall, [[0, -4, 0]], [WALL], np.linalg.inv(T)).agree == 0
 
 
@@ -86,7 +97,8 @@ def test_partners_are_found_up_to_the_reach(reach):
     same = (gap <= reach) & (labels_a[:, None] == labels_b)
     found = evidence(view(NOTHING_SEEN, keypoints(a, labels_a), CELL),
                      view(NOTHING_SEEN, keypoints(b, labels_b), CELL), np.eye(4), reach)
-    assert found.agree == pytest.approx((same.any(axis=1).mean() + same.any(axis=0).mean()) / 2)
+    agree = same.any(axis=1).sum() + same.any(axis=0).sum()
+    assert found.agree == pytest.approx(agree / (400 + 300))
 
 
 def test_no_keypoints_say_nothing(wall):
