@@ -60,7 +60,7 @@ def register(source: SemanticScan | PreparedScan, target: SemanticScan | Prepare
         target = target if isinstance(target, PreparedScan) else preprocess(target, config)
     if (source.scan.labels is None) != (target.scan.labels is None):
         source, target = _without_labels(source), _without_labels(target)
-    for attempt in _attempts(config):
+    for attempt in _attempts(config, labelled=source.scan.labels is not None):
         result = _globally(source, target, attempt, clock)
         if result.success:
             break
@@ -79,14 +79,15 @@ def _without_labels(prepared: PreparedScan) -> PreparedScan:
     return replace(again, warnings=('labels ignored: the other scan has none', *again.warnings))
 
 
-def _attempts(config: SgorConfig) -> Iterator[SgorConfig]:
+def _attempts(config: SgorConfig, *, labelled: bool) -> Iterator[SgorConfig]:
     """Yield the settings of a quick attempt with few keypoints, of all, and without labels."""
     if 0 < config.quick_keypoints < config.max_correspondences:
         yield config.replace(max_correspondences=config.quick_keypoints,
                              groups=min(config.groups, config.quick_groups),
                              group_size=max(config.quick_keypoints // 8, config.group_keep + 1))
     yield config
-    if config.unlabelled_attempt and config.semantics != 'none':
+    # without labels it would be the same attempt again
+    if labelled and config.unlabelled_attempt and config.semantics != 'none':
         yield config.replace(semantics='none')
 
 

@@ -15,4 +15,5 @@ class Stopwatch:
         """Time what is done inside the ``with``."""
         start = time.perf_counter()
         yield
-        self.seconds[stage] = time.perf_counter() - start
+        # a stage that several attempts go through adds up
+        self.seconds[stage] = self.seconds.get(stage, 0.0) + time.perf_counter() - start
