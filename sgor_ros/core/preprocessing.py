@@ -27,7 +27,7 @@ from .scan import PreparedScan
 from .scan import SemanticScan
 from .settings import InputError
 from .stopwatch import Stopwatch
-from .threads import use_threads
+from .threads import cores
 from .voxels import voxel_grid
 from .voxels import VoxelCloud
 
@@ -57,8 +57,13 @@ def preprocess(scan: SemanticScan, config: SgorConfig | None = None, *,
         Only one of keypoints and descriptors is given, or their lengths differ.
     """
     config = config or SgorConfig()
+    with cores(config.threads):
+        return _prepare(scan, config, keypoints, descriptors)
+
+
+def _prepare(scan: SemanticScan, config: SgorConfig, keypoints: ArrayLike | None,
+             descriptors: ArrayLike | None) -> PreparedScan:
     convention = label_convention(config.label_convention)
-    use_threads(config.threads)
     clock = Stopwatch()
     with clock('voxel grid'):
         points, labels, warnings = _usable(scan, convention, config)

@@ -28,7 +28,7 @@ from .scan import PreparedScan
 from .scan import Registration
 from .scan import SemanticScan
 from .stopwatch import Stopwatch
-from .threads import use_threads
+from .threads import cores
 from .verification import Normals
 from .verification import verify
 
@@ -53,7 +53,12 @@ def register(source: SemanticScan | PreparedScan, target: SemanticScan | Prepare
         With ``success=False`` and a reason where the scans cannot be registered.
     """
     config = config or SgorConfig()
-    use_threads(config.threads)
+    with cores(config.threads):
+        return _register(source, target, config)
+
+
+def _register(source: SemanticScan | PreparedScan, target: SemanticScan | PreparedScan,
+              config: SgorConfig) -> Registration:
     clock = Stopwatch()
     with clock('preprocessing'):
         source = source if isinstance(source, PreparedScan) else preprocess(source, config)
@@ -144,12 +149,11 @@ def register_correspondences(source_points: ArrayLike, target_points: ArrayLike,
         Shapes that do not fit, or values that are not finite.
     """
     config = config or SgorConfig()
-    use_threads(config.threads)
-    clock = Stopwatch()
-    correspondences = given_correspondences(source_points, target_points, source_labels,
-                                            target_labels, config)
-    result = solve(correspondences, ground_normals, None, config, clock)
-    return judge_matches(result, config)
+    with cores(config.threads):
+        correspondences = given_correspondences(source_points, target_points, source_labels,
+                                                target_labels, config)
+        result = solve(correspondences, ground_normals, None, config, Stopwatch())
+        return judge_matches(result, config)
 
 
 def solve(correspondences: Correspondences, ground_normals: Normals | None,
