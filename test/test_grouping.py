@@ -47,24 +47,39 @@ def test_right_matches_are_the_first_keys():
     assert (residual[keys] < 0.5).mean() > 0.95
 
 
+def members_of(groups, points):
+    """Return the group of each key as a list of indices."""
+    squared = ((points[groups.keys][:, None] - points) ** 2).sum(axis=-1)
+    return [np.flatnonzero(row <= reach * (1 + 1e-12)).tolist()
+            for row, reach in zip(squared, groups.squared_reach, strict=True)]
+
+
 @pytest.mark.parametrize('size', [3 + 1, 50, 10000])
 def test_groups_are_the_nearest_on_the_source(size):
     """k nearest by brute force, the key among them; never more than there are."""
     matches, _ = random_matches(200, 0.3, 2)
     config = SgorConfig(groups=20, group_size=size, group_keep=3)
     groups = group(matches, consistency_graph(matches, config), config)
-    assert groups.members.shape == (20, min(size, 200))
-    for key, members in zip(groups.keys, groups.members, strict=True):
+    for key, members in zip(groups.keys, members_of(groups, matches.source), strict=True):
         distance = np.linalg.norm(matches.source - matches.source[key], axis=1)
         assert key in members
-        assert len(set(members)) == len(members)
+        assert len(members) == min(size, 200)
         assert set(members) == set(np.argsort(distance, kind='stable')[:size])
 
 
+def test_matches_of_one_place_are_all_in_its_groups():
+    """All distances alike: none is farther than the k-th."""
+    matches, _ = random_matches(30, 1.0, 4)
+    matches.source[:] = matches.source[0]
+    config = SgorConfig(groups=5, group_size=10, group_keep=3)
+    groups = group(matches, consistency_graph(matches, config), config)
+    assert all(members == list(range(30)) for members in members_of(groups, matches.source))
+
+
 def test_fewer_matches_than_groups():
-    """Every match is a key once."""
+    """Every match is a key once, and in every group."""
     matches, _ = random_matches(12, 1.0, 3)
     config = SgorConfig(groups=200)
     groups = group(matches, consistency_graph(matches, config), config)
     assert sorted(groups.keys) == list(range(12))
-    assert groups.members.shape == (12, 12)
+    assert all(members == list(range(12)) for members in members_of(groups, matches.source))

@@ -5,8 +5,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from sgor_ros import SgorConfig
+from sgor_ros.core.consistency import FilteredGroups
 from sgor_ros.core.correspondences import Correspondences
-from sgor_ros.core.grouping import Groups
 from sgor_ros.core.hypotheses import fit_transforms
 from sgor_ros.core.hypotheses import hypothesise
 from sgor_ros.core.refinement import distances
@@ -83,15 +83,15 @@ def test_weight_zero_takes_no_part():
     np.testing.assert_allclose(fit_transforms(source, target, weights)[0], T, atol=1e-9)
 
 
-def test_the_best_of_each_group_decide():
-    """By hand: two groups of six share matches; the three best of each follow one pose."""
+def test_each_group_follows_its_own_matches():
+    """By hand: two groups share matches; those kept of each follow one pose."""
     rng = np.random.default_rng(5)
     source = rng.uniform(-20, 20, (9, 3))
     A, B = random_pose(6), random_pose(7)
     target = np.vstack((moved(A, source[:4]), moved(B, source[4:8]), source[8:]))
-    groups = Groups(np.array([0, 4]), np.array([[0, 1, 2, 5, 6, 8], [4, 5, 6, 1, 2, 8]]))
-    rows = np.array([[9, 8, 7, 1, 2, 0], [5, 6, 7, 4, 3, 2]], np.float32)
-    found = hypothesise(matches_of(source, target), groups, rows, 3)
+    filtered = FilteredGroups(np.array([[0, 1, 2], [6, 5, 4]]),
+                              np.array([[9, 8, 7], [7, 6, 5]], np.float32))
+    found = hypothesise(matches_of(source, target), filtered)
     np.testing.assert_allclose(found.T_target_source, [A, B], atol=1e-9)
     assert [set(row) for row in found.kept] == [{0, 1, 2}, {4, 5, 6}]
 
@@ -100,22 +100,14 @@ def test_the_best_of_each_group_decide():
 def test_groups_with_fewer_than_three_give_none(positive):
     """Only matches with weight count; those kept beyond them are marked as none."""
     source = np.random.default_rng(8).uniform(-9, 9, (6, 3))
-    rows = np.zeros((1, 6), np.float32)
-    rows[0, :positive] = 1
-    groups = Groups(np.array([0]), np.arange(6)[None])
-    found = hypothesise(matches_of(source, source + 1), groups, rows, 5)
+    kept, scores = np.full((1, 5), -1), np.zeros((1, 5), np.float32)
+    kept[0, :positive], scores[0, :positive] = np.arange(positive), 1
+    found = hypothesise(matches_of(source, source + 1), FilteredGroups(kept, scores))
     assert len(found.T_target_source) == (positive >= 3)
     if positive >= 3:
         assert sorted(found.kept[0]) == [-1] * (5 - positive) + list(range(positive))
         assert np.isfinite(found.T_target_source).all()
         np.testing.assert_allclose(found.T_target_source[0, :3, 3], 1.0, atol=1e-9)
-
-
-def test_more_to_keep_than_there_are():
-    source = np.random.default_rng(9).uniform(-9, 9, (4, 3))
-    found = hypothesise(matches_of(source, source), Groups(np.array([0]), np.arange(4)[None]),
-                        np.ones((1, 4), np.float32), 20)
-    assert found.kept.shape == (1, 4)
 
 
 def test_distances_by_hand():

@@ -1,8 +1,10 @@
-"""Semantic-geometric consistency (Sec. III-C, Eq. 7 and 9 to 12): the seed rows of M*.
+"""Semantic-geometric consistency (Sec. III-C, Eq. 7 and 9 to 13): what is kept of each group.
 
-The top-k of the paper reads one row of M* for each group, the seed's: they are summed along the
+The top-k of the paper reads one row of M* for each group, the seed's: it is summed along the
 edges of the consistency graph.
 """
+from dataclasses import dataclass
+
 import numba
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +12,26 @@ from numpy.typing import NDArray
 from .correspondences import Correspondences
 from .graph import ConsistencyGraph
 from .grouping import Groups
+from .grouping import squared_distance
+
+TASKS = 64
+"""The strongest keys come first and cost most: each task gets some of all strengths."""
+
+
+@dataclass(frozen=True, eq=False)
+class FilteredGroups:
+    """G'_l: the correspondences that are kept of each group, best first (Eq. 13).
+
+    Attributes
+    ----------
+    kept : (L, k1) int64
+        -1 where fewer are consistent with the key.
+    scores : (L, k1) float32
+        Their entries of row l of M*; 0 where there is none.
+    """
+
+    kept: NDArray[np.int64]
+    scores: NDArray[np.float32]
 
 
 def label_agreement(correspondences: Correspondences,
@@ -24,48 +46,51 @@ def label_agreement(correspondences: Correspondences,
     return tight, c.source_regional == c.target_regional
 
 
-def seed_rows(graph: ConsistencyGraph, groups: Groups, tight: NDArray[np.bool_],
-              loose: NDArray[np.bool_]) -> NDArray[np.float32]:
-    """Return row l of M* = M_s* o M_g o (M'_g W_m M'_g^T) for each group (Eq. 7 to 12).
-
-    Parameters
-    ----------
-    graph : ConsistencyGraph
-    groups : Groups
-        Keys (L,) and members (L, k).
-    tight, loose : (N,) bool
-        Whether a correspondence has the same point label, and the same regional label, at both
-        ends: M_s is their outer product with themselves (Eq. 9 and 10).
-
-    Returns
-    -------
-    (L, k) float32
-    """
-    rows = np.zeros(groups.members.shape, np.float32)
-    _seed_rows(graph.start, graph.inner, graph.index, graph.weight, groups.keys, groups.members,
-               tight, loose, rows)
-    return rows
+def filter_groups(correspondences: Correspondences, graph: ConsistencyGraph, groups: Groups,
+                  keep: int, semantics: str) -> FilteredGroups:
+    """Keep the best `keep` of each group by row l of M* = M_s* o M_g o (M'_g W_m M'_g^T)."""
+    filtered = FilteredGroups(np.full((len(groups.keys), keep), -1, np.int64),
+                              np.zeros((len(groups.keys), keep), np.float32))
+    _filter(graph.start, graph.inner, graph.index, graph.weight, correspondences.source,
+            groups.keys, groups.squared_reach, *label_agreement(correspondences, semantics),
+            filtered.kept, filtered.scores)
+    return filtered
 
 
 @numba.njit(cache=True, nogil=True, parallel=True)
-def _seed_rows(start, inner, index, weight, keys, members, tight,  # type: ignore[no-untyped-def]
-               loose, rows):
-    for g in numba.prange(len(keys)):
-        key = keys[g]
-        support = np.zeros(len(inner), np.float32)     # row of M'_g W_m
-        consistent = np.zeros(len(inner), np.bool_)    # row of M'_g
-        for k in range(start[key], inner[key]):
-            a = index[k]
-            consistent[a] = True
-            for e in range(start[a], start[a + 1]):
-                support[index[e]] += weight[e]
-        for m in range(members.shape[1]):
-            j = members[g, m]
-            if j < 0 or not consistent[j]:
-                continue
-            if not ((tight[key] and tight[j]) or (loose[key] and loose[j])):
-                continue
-            total = np.float32(0.0)
-            for e in range(start[j], inner[j]):
-                total += support[index[e]]
-            rows[g, m] = total
+def _filter(start, inner, index, weight, points, keys, squared_reach,  # type: ignore[no-untyped-def]
+            tight, loose, kept, scores):
+    for task in numba.prange(TASKS):
+        support = np.empty(len(inner), np.float32)
+        for g in range(np.int64(task), len(keys), TASKS):
+            key = keys[g]
+            support[:] = 0    # row of M'_g W_m
+            for k in range(start[key], inner[key]):
+                a = index[k]
+                for e in range(start[a], start[a + 1]):
+                    support[index[e]] += weight[e]
+            x, y, z = points[key]
+            for k in range(start[key], inner[key]):
+                j = index[k]
+                if squared_distance(points[j, 0], points[j, 1], points[j, 2], x, y, z
+                                    ) > squared_reach[g]:
+                    continue
+                # M_s is the outer product of these with themselves (Eq. 9 to 11)
+                if not ((tight[key] and tight[j]) or (loose[key] and loose[j])):
+                    continue
+                total = np.float32(0.0)
+                for e in range(start[j], inner[j]):
+                    total += support[index[e]]
+                _insert(total, j, scores[g], kept[g])
+
+
+@numba.njit(cache=True, nogil=True)
+def _insert(score, item, scores, items):  # type: ignore[no-untyped-def]
+    """Put an item into its place among the best; the worst drops out."""
+    at = len(scores) - 1
+    if score <= scores[at]:
+        return
+    while at > 0 and scores[at - 1] < score:
+        scores[at], items[at] = scores[at - 1], items[at - 1]
+        at -= 1
+    scores[at], items[at] = score, item

@@ -1,8 +1,12 @@
 """Geometric consistency of all pairs of correspondences as a sparse graph (Sec. III-C).
 
 Only 1 to 3 % of the pairs are consistent, so nothing here is N x N but one bit a pair.
+
+Indices are unsigned: numba lets signed ones count from the end, which costs as much as the rest
+of these loops.
 """
 from dataclasses import dataclass
+import math
 
 import numba
 import numpy as np
@@ -14,6 +18,15 @@ from .correspondences import Correspondences
 PREFILTER_SLACK = 1e-3
 """Metres: float32 finds the candidate pairs, float64 decides. In a scan of 100 m the former errs
 by some 1e-5."""
+WEIGHT_STEPS = 8192
+"""Steps of the table of W_m; between them it is linear, which is off by less than 1e-7."""
+
+U64 = np.uint64
+_ONE = U64(1)
+# the lowest bit of a word, times this, has the place of that bit in its upper six bits
+_DE_BRUIJN = U64(0x03F79D71B4CB0A89)
+_PLACES = np.empty(64, np.uint32)
+_PLACES[[(int(_DE_BRUIJN) << place & 2**64 - 1) >> 58 for place in range(64)]] = range(64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,20 +34,20 @@ class ConsistencyGraph:
     """Pairs of correspondences with d_ij up to `weight_cutoff` sigma_d, as compressed rows.
 
     Row i is ``index[start[i]:start[i + 1]]``; its first part, up to ``inner[i]``, holds the
-    consistent ones (d_ij <= sigma_d: M'_g, Eq. 6), i itself first.
+    consistent ones (d_ij <= sigma_d: M'_g, Eq. 6), i itself among them.
 
     Attributes
     ----------
-    start : (N + 1,) int64
-    inner : (N,) int64
-    index : (E,) int32
+    start : (N + 1,) uint64
+    inner : (N,) uint64
+    index : (E,) uint32
     weight : (E,) float32
         W_m of each pair (Eq. 8).
     """
 
-    start: NDArray[np.int64]
-    inner: NDArray[np.int64]
-    index: NDArray[np.int32]
+    start: NDArray[np.uint64]
+    inner: NDArray[np.uint64]
+    index: NDArray[np.uint32]
     weight: NDArray[np.float32]
 
 
@@ -45,31 +58,30 @@ def consistency_graph(correspondences: Correspondences, config: SgorConfig) -> C
     reach = config.sigma_d * config.weight_cutoff
     columns = np.ascontiguousarray(np.hstack((p - p.mean(axis=0), q - q.mean(axis=0))).T,
                                    np.float32)
-    bits = np.empty((n, n // 8 + 1), np.uint8)
-    upper = np.zeros(n + 1, np.int64)
-    _mark_pairs(columns, np.float32((reach + PREFILTER_SLACK)**2), bits, upper)
-    np.cumsum(upper, out=upper)
-    index = np.empty(upper[-1], np.int32)
-    weight = np.empty(upper[-1], np.float32)
-    degree = _weigh_pairs(p, q, bits, config.sigma_d, reach, upper, index, weight)
-    start = np.zeros(n + 1, np.int64)
-    np.cumsum(degree + 1, out=start[1:])
-    inner = np.empty(n, np.int64)
-    full_index = np.empty(start[-1], np.int32)
-    full_weight = np.empty(start[-1], np.float32)
-    _mirror(upper, index, weight, start, inner, full_index, full_weight)
-    return ConsistencyGraph(start, inner, full_index, full_weight)
+    bits = np.empty((n, -(-n // 64)), np.uint64)
+    _mark_pairs(columns, np.float32((reach + PREFILTER_SLACK)**2), bits)
+    _mirror(bits)
+    start = np.zeros(n + 1, np.uint64)
+    start[1:] = np.cumsum(_count_bits(bits))
+    inner = np.empty(n, np.uint64)
+    # one piece of memory: of two, the system takes back what the next call asks for again
+    edges = np.empty((2, start[-1]), np.uint32)
+    index, weight = edges[0], edges[1].view(np.float32)
+    table = np.exp(-0.5 * (np.linspace(0, reach, WEIGHT_STEPS + 1) / config.sigma_d)**2)
+    _weigh_pairs(np.hstack((p, q)), bits, config.sigma_d, reach, table, start, inner, index,
+                 weight)
+    return ConsistencyGraph(start, inner, index, weight)
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True)
-def _mark_row(columns, i, limit, near):  # type: ignore[no-untyped-def]
-    """Write whether (|p_i - p_j| - |q_i - q_j|)^2 <= limit for all j > i, without a square root.
+def _mark_row(columns, i, first, limit, near):  # type: ignore[no-untyped-def]
+    """Write whether (|p_i - p_j| - |q_i - q_j|)^2 <= limit for j from `first` on, without a root.
 
-    Slices from i + 1 on, and not an index that starts there, let the compiler use vectors.
+    Slices, and not an index that starts at `first`, let the compiler use vectors.
     """
     px, py, pz, qx, qy, qz = columns[:, i]
-    ax, ay, az = columns[0, i + 1:], columns[1, i + 1:], columns[2, i + 1:]
-    bx, by, bz = columns[3, i + 1:], columns[4, i + 1:], columns[5, i + 1:]
+    ax, ay, az = columns[0, first:], columns[1, first:], columns[2, first:]
+    bx, by, bz = columns[3, first:], columns[4, first:], columns[5, first:]
     for j in range(len(ax)):
         x, y, z = ax[j] - px, ay[j] - py, az[j] - pz
         p = x * x + y * y + z * z
@@ -81,83 +93,108 @@ def _mark_row(columns, i, limit, near):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True, parallel=True)
-def _mark_pairs(columns, limit, bits, upper):  # type: ignore[no-untyped-def]
-    """Set bit j - i - 1 of row i for each candidate pair; count them into upper[i + 1]."""
+def _mark_pairs(columns, limit, bits):  # type: ignore[no-untyped-def]
+    """Set bit j of row i for each candidate pair, from the 64 columns on that i itself is in."""
     n = columns.shape[1]
-    gather = np.uint64(0x0102040810204080)    # eight bytes of 0 or 1 to eight bits
-    add = np.uint64(0x0101010101010101)
+    gather = U64(0x0102040810204080)    # eight bytes of 0 or 1 to eight bits
     for task in numba.prange((n + 1) // 2):
         half = np.int64(task)
-        near = np.zeros(n // 8 * 8 + 8, np.uint8)
-        words = near.view(np.uint64)
         # row i beside row n - 1 - i: all tasks cost the same
         for i in ((half, n - 1 - half) if half != n - 1 - half else (half, half)):
-            _mark_row(columns, i, limit, near)
-            near[n - 1 - i:] = 0
-            found = np.int64(0)
-            for w in range((n - 1 - i) // 8 + 1):
-                bits[i, w] = (words[w] * gather) >> np.uint64(56)
-                found += np.int64((words[w] * add) >> np.uint64(56))
-            upper[i + 1] = found
+            first = i // 64
+            near = np.zeros(64 * (bits.shape[1] - first), np.uint8)
+            _mark_row(columns, i, 64 * first, limit, near)
+            eights = near.view(np.uint64)
+            for w in range(bits.shape[1] - first):
+                word = U64(0)
+                for b in range(8):
+                    word |= ((eights[8 * w + b] * gather) >> U64(56)) << U64(8 * b)
+                bits[i, first + w] = word
 
 
 @numba.njit(cache=True, nogil=True, parallel=True)
-def _weigh_pairs(p, q, bits, sigma_d, reach, upper, index,  # type: ignore[no-untyped-def]
-                 weight):
-    """Write W_m of each candidate pair, negative beyond sigma_d, 0 beyond `reach`.
-
-    Returns the pairs of each correspondence, (N,).
-    """
-    n = len(p)
-    for i in numba.prange(n):
-        at = upper[i]
-        for w in range((n - 1 - np.int64(i)) // 8 + 1):
-            if bits[i, w]:
-                for b in range(8):
-                    if (bits[i, w] >> b) & 1:
-                        j = np.int64(i) + 1 + 8 * w + b
-                        index[at] = j
-                        d = abs(np.sqrt((p[i, 0] - p[j, 0]) ** 2 + (p[i, 1] - p[j, 1]) ** 2
-                                        + (p[i, 2] - p[j, 2]) ** 2)
-                                - np.sqrt((q[i, 0] - q[j, 0]) ** 2 + (q[i, 1] - q[j, 1]) ** 2
-                                          + (q[i, 2] - q[j, 2]) ** 2))
-                        value = np.exp(-0.5 * (d / sigma_d) ** 2)
-                        weight[at] = value if d <= sigma_d else -value if d <= reach else 0.0
-                        at += 1
-    degree = np.zeros(n, np.int64)
-    for i in range(n):
-        for k in range(upper[i], upper[i + 1]):
-            if weight[k] != 0:
-                degree[i] += 1
-                degree[index[k]] += 1
-    return degree
+def _mirror(bits):  # type: ignore[no-untyped-def]
+    """Fill the blocks of 64 x 64 below the diagonal from those above."""
+    n, words = bits.shape
+    for task in numba.prange(words):
+        half = np.int64(task) // 2
+        row = words - 1 - half if task % 2 else half    # short and long ones for each thread
+        block = np.empty(64, np.uint64)
+        for column in range(row):
+            for k in range(64):
+                block[k] = bits[64 * column + k, row]
+            _transpose(block)
+            for k in range(min(64, n - 64 * row)):
+                bits[64 * row + k, column] = block[k]
 
 
 @numba.njit(cache=True, nogil=True)
-def _mirror(upper, index, weight, start, inner, full_index,  # type: ignore[no-untyped-def]
-            full_weight):
-    """Write each pair into both of its rows: consistent ones from the front, others behind."""
-    n = len(inner)
-    end = start[1:].copy()
-    for i in range(n):
-        full_index[start[i]] = i
-        full_weight[start[i]] = 1.0
-        inner[i] = start[i] + 1
-    for i in range(n):
-        for k in range(upper[i], upper[i + 1]):
-            j = index[k]
-            w = weight[k]
-            if w > 0:
-                full_index[inner[i]] = j
-                full_weight[inner[i]] = w
-                inner[i] += 1
-                full_index[inner[j]] = i
-                full_weight[inner[j]] = w
-                inner[j] += 1
-            elif w < 0:
-                end[i] -= 1
-                full_index[end[i]] = j
-                full_weight[end[i]] = -w
-                end[j] -= 1
-                full_index[end[j]] = i
-                full_weight[end[j]] = -w
+def _transpose(block):  # type: ignore[no-untyped-def]
+    """Transpose 64 x 64 bits: swap the off-diagonal quarters, then within each quarter."""
+    width, mask = U64(32), U64(0x00000000FFFFFFFF)
+    while width:
+        k = U64(0)
+        while k < U64(64):    # the rows of upper quarters
+            swap = ((block[k] >> width) ^ block[k + width]) & mask
+            block[k + width] ^= swap
+            block[k] ^= swap << width
+            k = (k + width + _ONE) & ~width
+        width >>= _ONE
+        mask ^= mask << width
+
+
+@numba.njit(cache=True, nogil=True, parallel=True)
+def _count_bits(bits):  # type: ignore[no-untyped-def]
+    """Return the bits set in each row, (N,)."""
+    count = np.empty(len(bits), np.uint64)
+    for i in numba.prange(len(bits)):
+        total = U64(0)
+        for word in bits[i]:
+            # sums of 2, 4 and 8 bits side by side, then of all bytes
+            word -= (word >> _ONE) & U64(0x5555555555555555)
+            word = (word & U64(0x3333333333333333)) + ((word >> U64(2)) & U64(0x3333333333333333))
+            word = (word + (word >> U64(4))) & U64(0x0F0F0F0F0F0F0F0F)
+            total += (word * U64(0x0101010101010101)) >> U64(56)
+        count[i] = total
+    return count
+
+
+@numba.njit(cache=True, nogil=True, parallel=True, error_model='numpy')
+def _weigh_pairs(both, bits, sigma_d, reach, table, start,  # type: ignore[no-untyped-def]
+                 inner, index, weight):
+    """Write the rows of the graph: consistent pairs from the front, others from the back.
+
+    Candidates that float64 finds beyond `reach` stay, with weight 0.
+    """
+    steps = len(table) - 1
+    for i in numba.prange(len(both)):
+        near = np.empty(start[i + 1] - start[i], np.uint32)
+        gap = np.empty(len(near))
+        found = U64(0)
+        for w in range(bits.shape[1]):
+            word = bits[i, w]
+            while word:
+                low = word & (~word + _ONE)
+                near[found] = U64(64) * U64(w) + _PLACES[(low * _DE_BRUIJN) >> U64(58)]
+                found += _ONE
+                word ^= low
+        px, py, pz, qx, qy, qz = both[i]
+        for k in range(len(near)):
+            j = near[k]
+            x, y, z = both[j, 0] - px, both[j, 1] - py, both[j, 2] - pz
+            length = math.sqrt(x * x + y * y + z * z)
+            x, y, z = both[j, 3] - qx, both[j, 4] - qy, both[j, 5] - qz
+            gap[k] = abs(length - math.sqrt(x * x + y * y + z * z))
+        front, back = start[i], start[i + 1] - _ONE
+        for k in range(len(near)):
+            d = gap[k]
+            at = d * (steps / reach)
+            cell = U64(min(at, steps - 1.0))
+            value = np.float32(table[cell] + (at - cell) * (table[cell + _ONE] - table[cell]))
+            # written at both ends and kept at one: no branch to mispredict
+            index[front] = index[back] = near[k]
+            weight[front] = weight[back] = value if d <= reach else np.float32(0.0)
+            consistent = U64(d <= sigma_d)
+            front += consistent
+            back -= _ONE - consistent
+        inner[i] = front

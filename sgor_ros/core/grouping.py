@@ -8,11 +8,14 @@ from numpy.typing import NDArray
 from .config import SgorConfig
 from .correspondences import Correspondences
 from .graph import ConsistencyGraph
+from .graph import U64
 
 POWER_ITERATIONS = 10
 """As PointDSC; the order of the keys has settled by then."""
 MOST_VISITS, FEWEST_GROUPS = 1e8, 20
 """Edges to visit for all seed rows, some tenths of a second; and the groups that remain."""
+BINS = 1024
+"""Of the histogram that selects the k-th nearest."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,19 +24,20 @@ class Groups:
 
     Attributes
     ----------
-    keys : (L,) int64
+    keys : (L,) uint32
         Key correspondences G^k, the strongest first; fewer than asked for in a dense graph.
-    members : (L, k) int64
-        Correspondences nearest to each key on the source, the key among them, in no order.
+    squared_reach : (L,) float64
+        Squared distance from each key to its k-th nearest correspondence on the source, itself
+        the first, m^2: a group is all up to there.
     """
 
-    keys: NDArray[np.int64]
-    members: NDArray[np.int64]
+    keys: NDArray[np.uint32]
+    squared_reach: NDArray[np.float64]
 
 
 def group(correspondences: Correspondences, graph: ConsistencyGraph,
           config: SgorConfig) -> Groups:
-    """Choose keys by spectral matching and gather the k nearest correspondences of each."""
+    """Choose keys by spectral matching and find how far the k nearest of each reach."""
     score = leading_eigenvector(graph)
     order = np.argsort(-score, kind='stable')
     keys = _spread(correspondences.source, order, min(config.groups, len(order)),
@@ -42,7 +46,7 @@ def group(correspondences: Correspondences, graph: ConsistencyGraph,
     visits = np.cumsum((graph.inner - graph.start[:-1])[keys].astype(np.float64)**2)
     keys = keys[:max(int(np.searchsorted(visits, MOST_VISITS)), FEWEST_GROUPS)]
     k = min(config.group_size, len(correspondences))
-    return Groups(keys, _nearest(correspondences.source, keys, k))
+    return Groups(keys, _squared_reach(np.ascontiguousarray(correspondences.source.T), keys, k))
 
 
 def leading_eigenvector(graph: ConsistencyGraph) -> NDArray[np.float32]:
@@ -64,18 +68,27 @@ def leading_eigenvector(graph: ConsistencyGraph) -> NDArray[np.float32]:
 def _multiply(start, inner, index, weight, vector):  # type: ignore[no-untyped-def]
     product = np.empty_like(vector)
     for i in numba.prange(len(vector)):
-        total = np.float32(0.0)
-        for e in range(start[i], inner[i]):
-            total += weight[e] * vector[index[e]]
-        product[i] = total
+        # four sums, so that an addition need not wait for the one before
+        a = b = c = d = np.float32(0.0)
+        e, end = start[i], inner[i]
+        while e + U64(4) <= end:
+            a += weight[e] * vector[index[e]]
+            b += weight[e + U64(1)] * vector[index[e + U64(1)]]
+            c += weight[e + U64(2)] * vector[index[e + U64(2)]]
+            d += weight[e + U64(3)] * vector[index[e + U64(3)]]
+            e += U64(4)
+        while e < end:
+            a += weight[e] * vector[index[e]]
+            e += U64(1)
+        product[i] = (a + b) + (c + d)
     return product
 
 
 @numba.njit(cache=True, nogil=True)
 def _spread(points, order, count, spacing):  # type: ignore[no-untyped-def]
     """Take the strongest first, passing over those near a taken one; then fill up with those."""
-    taken = np.empty(count, np.int64)
-    passed = np.empty(len(order), np.int64)
+    taken = np.empty(count, np.uint32)
+    passed = np.empty(len(order), np.uint32)
     n_taken = 0
     n_passed = 0
     limit = spacing * spacing
@@ -102,41 +115,37 @@ def _spread(points, order, count, spacing):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True, parallel=True)
-def _nearest(points, keys, k):  # type: ignore[no-untyped-def]
-    """Return the k nearest points of each key, (L, k): for large k faster than a tree."""
-    n = len(points)
-    members = np.empty((len(keys), k), np.int64)
+def _squared_reach(columns, keys, k):  # type: ignore[no-untyped-def]
+    """Return the k-th smallest squared distance to each key: for large k faster than a tree."""
+    n = columns.shape[1]
+    reach = np.empty(len(keys))
     for g in numba.prange(len(keys)):
-        x, y, z = points[keys[g]]
+        x, y, z = columns[:, keys[g]]
         squared = np.empty(n)
         for i in range(n):
-            squared[i] = ((points[i, 0] - x) ** 2 + (points[i, 1] - y) ** 2
-                          + (points[i, 2] - z) ** 2)
-        limit = _kth_smallest(squared, k)
-        found = 0
-        for i in range(n):
-            if squared[i] < limit:
-                members[g, found] = i
-                found += 1
-        for i in range(n):    # those at the limit share the places that are left
-            if found == k:
-                break
-            if squared[i] == limit:
-                members[g, found] = i
-                found += 1
-    return members
+            squared[i] = squared_distance(columns[0, i], columns[1, i], columns[2, i], x, y, z)
+        reach[g] = _kth_smallest(squared, k)
+    return reach
+
+
+@numba.njit(cache=True, nogil=True, inline='always')
+def squared_distance(ax, ay, az, bx, by, bz):  # type: ignore[no-untyped-def]
+    """Return the squared distance of two points; whoever asks for members rounds alike."""
+    return (ax - bx) * (ax - bx) + (ay - by) * (ay - by) + (az - bz) * (az - bz)
 
 
 @numba.njit(cache=True, nogil=True)
 def _kth_smallest(values, k):  # type: ignore[no-untyped-def]
     """Select by a histogram first, so that only one bin of it is sorted."""
-    top = values.max()
+    top = 0.0
+    for v in values:
+        top = max(top, v)
     if top == 0:
         return top
-    scale = 255.0 / top
-    count = np.zeros(256, np.int64)
+    scale = (BINS - 1) / top
+    count = np.zeros(BINS, np.int64)
     for v in values:
-        count[int(v * scale)] += 1
+        count[np.uint64(v * scale)] += 1
     before, at = 0, 0
     while before + count[at] < k:
         before += count[at]
@@ -144,7 +153,7 @@ def _kth_smallest(values, k):  # type: ignore[no-untyped-def]
     inside = np.empty(count[at])
     n = 0
     for v in values:
-        if int(v * scale) == at:
+        if np.uint64(v * scale) == at:
             inside[n] = v
             n += 1
     return np.sort(inside)[k - before - 1]

@@ -9,8 +9,7 @@ from .acceptance import judge
 from .acceptance import judge_matches
 from .alignment import align
 from .config import SgorConfig
-from .consistency import label_agreement
-from .consistency import seed_rows
+from .consistency import filter_groups
 from .correspondences import Correspondences
 from .correspondences import given_correspondences
 from .correspondences import match
@@ -168,9 +167,10 @@ def solve(correspondences: Correspondences, ground_normals: Normals | None,
     with clock('grouping'):
         groups = group(correspondences, graph, config)
     with clock('consistency'):
-        rows = seed_rows(graph, groups, *label_agreement(correspondences, config.semantics))
+        filtered = filter_groups(correspondences, graph, groups, config.group_keep,
+                                 config.semantics)
     with clock('hypotheses'):
-        hypotheses = hypothesise(correspondences, groups, rows, config.group_keep)
+        hypotheses = hypothesise(correspondences, filtered)
     with clock('verification'):
         verdict = verify(hypotheses, correspondences, ground_normals, views, config)
     found = replace(found, hypotheses=hypotheses.T_target_source,
