@@ -7,6 +7,8 @@ from numpy.typing import NDArray
 
 MAX_CELLS = 250_000
 """Bound on the search grid: beyond it empty cells would cost more than longer candidate lists."""
+TASKS = 64
+"""Pieces of a search that threads share."""
 
 
 @dataclass(frozen=True)
@@ -15,15 +17,16 @@ class Neighbours:
 
     Attributes
     ----------
-    start : (V + 1,) int64
+    start : (V + 1,) uint64
         Row i holds the neighbours ``index[start[i]:start[i + 1]]``, the point itself first.
-    index : (M,) int32
+    index : (M,) uint32
+        Unsigned, see `graph`.
     squared : (M,) float32
         Squared distances, m^2.
     """
 
-    start: NDArray[np.int64]
-    index: NDArray[np.int32]
+    start: NDArray[np.uint64]
+    index: NDArray[np.uint32]
     squared: NDArray[np.float32]
 
 
@@ -37,7 +40,7 @@ def radius_neighbours(points: NDArray[np.float64], radius: float) -> Neighbours:
         Metres.
     """
     if len(points) == 0:
-        return Neighbours(np.zeros(1, np.int64), np.empty(0, np.int32), np.empty(0, np.float32))
+        return Neighbours(np.zeros(1, np.uint64), np.empty(0, np.uint32), np.empty(0, np.float32))
     low = points.min(axis=0)
     extent = points.max(axis=0) - low
     cell = radius
@@ -47,57 +50,57 @@ def radius_neighbours(points: NDArray[np.float64], radius: float) -> Neighbours:
     shape = np.floor(extent / cell).astype(np.int64) + 3
     x, y, z = np.floor((points - low) / cell).astype(np.int64).T + 1
     cells = (x * shape[1] + y) * shape[2] + z
-    order = np.argsort(cells, kind='stable').astype(np.int32)
-    first = np.zeros(np.prod(shape) + 1, np.int32)
+    order = np.argsort(cells, kind='stable').astype(np.uint32)
+    first = np.zeros(np.prod(shape) + 1, np.uint32)
     np.cumsum(np.bincount(cells, minlength=np.prod(shape)), out=first[1:])
     columns = np.ascontiguousarray(points[order].T)
-    start = np.zeros(len(points) + 1, np.int64)
-    _count(columns, cells[order], order, first, shape[1], shape[2], radius, start)
+    grid = columns, cells[order], order, first, shape[1], shape[2], radius * radius
+    start = np.zeros(len(points) + 1, np.uint64)
+    _count(*grid, start)
     np.cumsum(start, out=start)
-    index = np.empty(start[-1], np.int32)
+    index = np.empty(start[-1], np.uint32)
     squared = np.empty(start[-1], np.float32)
-    _fill(columns, cells[order], order, first, shape[1], shape[2], radius, start, index, squared)
+    _fill(*grid, start, index, squared)
     return Neighbours(start, index, squared)
 
 
-@numba.njit(cache=True, nogil=True, inline='always')
-def _squared(columns, i, j):  # type: ignore[no-untyped-def]
-    a = columns[0, j] - columns[0, i]
-    b = columns[1, j] - columns[1, i]
-    c = columns[2, j] - columns[2, i]
-    return a * a + b * b + c * c
-
-
 @numba.njit(cache=True, nogil=True, parallel=True)
-def _count(columns, cells, order, first, ny, nz, radius, start):  # type: ignore[no-untyped-def]
-    limit = radius * radius
+def _count(columns, cells, order, first, ny, nz, limit, start):  # type: ignore[no-untyped-def]
     for at in numba.prange(len(order)):
-        i = np.int64(at)
+        x, y, z = columns[:, at]
         found = 0
         for dx in range(-1, 2):
             for dy in range(-1, 2):
-                row = cells[i] + (dx * ny + dy) * nz
-                for j in range(first[row - 1], first[row + 2]):
-                    found += _squared(columns, i, j) <= limit
-        start[order[i] + 1] = found
+                row = cells[at] + (dx * ny + dy) * nz
+                # slices let the compiler use vectors
+                run = columns[:, first[row - 1]:first[row + 2]]
+                for j in range(run.shape[1]):
+                    a, b, c = run[0, j] - x, run[1, j] - y, run[2, j] - z
+                    found += a * a + b * b + c * c <= limit
+        start[order[at] + 1] = found
 
 
 @numba.njit(cache=True, nogil=True, parallel=True)
-def _fill(columns, cells, order, first, ny, nz, radius, start,  # type: ignore[no-untyped-def]
+def _fill(columns, cells, order, first, ny, nz, limit, start,  # type: ignore[no-untyped-def]
           index, squared):
-    limit = radius * radius
-    for at in numba.prange(len(order)):
-        i = np.int64(at)
-        slot = start[order[i]]
-        index[slot] = order[i]
-        squared[slot] = 0.0
-        slot += 1
-        for dx in range(-1, 2):
-            for dy in range(-1, 2):
-                row = cells[i] + (dx * ny + dy) * nz
-                for j in range(first[row - 1], first[row + 2]):
-                    d = _squared(columns, i, j)
-                    if d <= limit and j != i:
-                        index[slot] = order[j]
-                        squared[slot] = d
-                        slot += 1
+    longest = np.diff(start).max() + 1
+    for task in numba.prange(TASKS):
+        # room for one candidate more than stay: every candidate is written, without a branch
+        near, gap = np.empty(longest, np.uint32), np.empty(longest, np.float32)
+        for at in range(len(order) * np.int64(task) // TASKS,
+                        len(order) * (np.int64(task) + 1) // TASKS):
+            x, y, z = columns[:, at]
+            near[0], gap[0] = order[at], 0.0
+            found = np.uint64(1)
+            for dx in range(-1, 2):
+                for dy in range(-1, 2):
+                    row = cells[at] + (dx * ny + dy) * nz
+                    for j in range(np.uint64(first[row - 1]), np.uint64(first[row + 2])):
+                        a, b, c = columns[0, j] - x, columns[1, j] - y, columns[2, j] - z
+                        d = a * a + b * b + c * c
+                        near[found], gap[found] = order[j], d
+                        found += np.uint64((d <= limit) & (j != np.uint64(at)))
+            begin = start[order[at]]
+            for k in range(found):
+                index[begin + k] = near[k]
+                squared[begin + k] = gap[k]
