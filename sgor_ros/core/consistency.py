@@ -48,7 +48,19 @@ def label_agreement(correspondences: Correspondences,
 
 def filter_groups(correspondences: Correspondences, graph: ConsistencyGraph, groups: Groups,
                   keep: int, semantics: str) -> FilteredGroups:
-    """Keep the best `keep` of each group by row l of M* = M_s* o M_g o (M'_g W_m M'_g^T)."""
+    """Keep the best of each group by row l of M* = M_s* o M_g o (M'_g W_m M'_g^T) (Eq. 7 to 13).
+
+    Parameters
+    ----------
+    correspondences : Correspondences
+    graph : ConsistencyGraph
+        Of these correspondences.
+    groups : Groups
+    keep : int
+        k_1, at most so many of each group.
+    semantics : {'loose', 'hard', 'none'}
+        See `SgorConfig`.
+    """
     filtered = FilteredGroups(np.full((len(groups.keys), keep), -1, np.int64),
                               np.zeros((len(groups.keys), keep), np.float32))
     _filter(graph.start, graph.inner, graph.index, graph.weight, correspondences.source,
