@@ -298,7 +298,14 @@ def test_ablation_command(sequences_folder, tmp_path):
                  str(out)]) == 0
     rows = rows_of(out)
     names = [r['method'] for r in rows]
-    assert len(set(names)) == len(names) == 17
+    assert len(set(names)) == len(names)
+    # all that the default does and the paper does not, but for mere sizes
+    default, paper = SgorConfig(), SgorConfig.paper()
+    beyond = {item.name for item in SgorConfig.settings()
+              if getattr(default, item.name) != getattr(paper, item.name)}
+    assert {name.split('=')[0] for name in names if '=' in name and 'paper' not in name
+            } == beyond - {'groups', 'group_size'}
+    assert sum(name.startswith('paper, ') for name in names) == 5    # its own ablations
     default = next(r for r in rows if r['method'] == 'default')
     assert default['within'] == 'True'
     # without the local refinement the answer is another
