@@ -43,7 +43,7 @@ setup(
         'rosbags~=0.11.0',    # its 0.x releases remove names
         'scipy>=1.11',
         'small_gicp>=1.0',
-        'threadpoolctl',
+        'threadpoolctl>=3.0',
         'tqdm',
     ],
     extras_require={

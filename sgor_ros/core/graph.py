@@ -19,7 +19,7 @@ PREFILTER_SLACK = 1e-3
 """Metres: float32 finds the candidate pairs, float64 decides. In a scan of 100 m the former errs
 by some 1e-5."""
 WEIGHT_STEPS = 8192
-"""Steps of the table of W_m; between them it is linear, which is off by less than 1e-7."""
+"""Steps of the table of W_m; between them it is linear, which is off by 1e-7 or so at the most."""
 
 U64 = np.uint64
 _ONE = U64(1)

@@ -95,10 +95,9 @@ def _spread(points, order, count, spacing):  # type: ignore[no-untyped-def]
     for i in order:
         near = False
         for t in range(n_taken):
-            a = points[i, 0] - points[taken[t], 0]
-            b = points[i, 1] - points[taken[t], 1]
-            c = points[i, 2] - points[taken[t], 2]
-            if a * a + b * b + c * c < limit:
+            k = taken[t]
+            if squared_distance(points[i, 0], points[i, 1], points[i, 2],
+                                points[k, 0], points[k, 1], points[k, 2]) < limit:
                 near = True
                 break
         if near:
@@ -137,15 +136,13 @@ def squared_distance(ax, ay, az, bx, by, bz):  # type: ignore[no-untyped-def]
 @numba.njit(cache=True, nogil=True)
 def _kth_smallest(values, k):  # type: ignore[no-untyped-def]
     """Select by a histogram first, so that only one bin of it is sorted."""
-    top = 0.0
-    for v in values:
-        top = max(top, v)
+    top = values.max()
     if top == 0:
         return top
     scale = (BINS - 1) / top
     count = np.zeros(BINS, np.int64)
     for v in values:
-        count[np.uint64(v * scale)] += 1
+        count[U64(v * scale)] += 1
     before, at = 0, 0
     while before + count[at] < k:
         before += count[at]
@@ -153,7 +150,7 @@ def _kth_smallest(values, k):  # type: ignore[no-untyped-def]
     inside = np.empty(count[at])
     n = 0
     for v in values:
-        if np.uint64(v * scale) == at:
+        if U64(v * scale) == at:
             inside[n] = v
             n += 1
     return np.sort(inside)[k - before - 1]

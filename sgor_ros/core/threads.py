@@ -53,7 +53,8 @@ def cores(count: int) -> Iterator[None]:
     """Let the compiled loops of this thread use up to `count` cores, and BLAS one.
 
     Our matrices are small, and threads of BLAS spin for tens of milliseconds after each product:
-    on two cores that doubled the time of a scan.
+    on two cores that doubled the CPU time of a scan. BLAS has one setting for the whole process:
+    where several threads are in here at once, the last to leave may leave it at one.
     """
     before = numba.get_num_threads()
     numba.set_num_threads(min(count, _config.NUMBA_NUM_THREADS))
