@@ -1,12 +1,12 @@
 """SGOR: global registration of labelled LiDAR scans, and the odometry built on it."""
+from .core.common.settings import InputError
 from .core.config import SgorConfig
-from .core.preprocessing import preprocess
 from .core.registration import register
 from .core.registration import register_correspondences
-from .core.scan import PreparedScan
-from .core.scan import Registration
-from .core.scan import SemanticScan
-from .core.settings import InputError
+from .core.result import Registration
+from .core.scan.preprocessing import preprocess
+from .core.scan.scan import PreparedScan
+from .core.scan.scan import SemanticScan
 from .tracker import TrackedScan
 from .tracker import Tracker
 from .tracker import TrackerConfig

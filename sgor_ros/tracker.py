@@ -7,15 +7,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from .core import se3
+from .core.common import se3
+from .core.common.settings import setting
+from .core.common.settings import Settings
 from .core.config import SgorConfig
-from .core.preprocessing import preprocess
 from .core.registration import register
-from .core.scan import PreparedScan
-from .core.scan import Registration
-from .core.scan import SemanticScan
-from .core.settings import setting
-from .core.settings import Settings
+from .core.result import Registration
+from .core.scan.preprocessing import preprocess
+from .core.scan.scan import PreparedScan
+from .core.scan.scan import SemanticScan
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 from sgor_ros import SgorConfig
 from sgor_ros.core.alignment import align
 from sgor_ros.core.alignment import surface
-from sgor_ros.core.voxels import voxel_grid
+from sgor_ros.core.scan.voxels import voxel_grid
 
 
 @pytest.fixture(scope='module')

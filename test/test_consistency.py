@@ -6,12 +6,12 @@ from scipy.spatial.transform import Rotation
 
 from sgor_ros import register_correspondences
 from sgor_ros import SgorConfig
-from sgor_ros.core.consistency import filter_groups
-from sgor_ros.core.consistency import label_agreement
-from sgor_ros.core.correspondences import Correspondences
-from sgor_ros.core.graph import consistency_graph
-from sgor_ros.core.grouping import group
-from sgor_ros.core.grouping import leading_eigenvector
+from sgor_ros.core.matching.correspondences import Correspondences
+from sgor_ros.core.solver.consistency import filter_groups
+from sgor_ros.core.solver.consistency import label_agreement
+from sgor_ros.core.solver.graph import consistency_graph
+from sgor_ros.core.solver.grouping import group
+from sgor_ros.core.solver.grouping import leading_eigenvector
 
 CUTOFFS = (1.0, 6.0)
 PAPER = SgorConfig.paper()

@@ -4,11 +4,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from sgor_ros import SgorConfig
-from sgor_ros.core.context import context_classes
-from sgor_ros.core.context import OCTAVES
-from sgor_ros.core.context import semantic_context
-from sgor_ros.core.ground import Ground
-from sgor_ros.core.labels import label_convention
+from sgor_ros.core.scan.context import context_classes
+from sgor_ros.core.scan.context import OCTAVES
+from sgor_ros.core.scan.context import semantic_context
+from sgor_ros.core.scan.ground import Ground
+from sgor_ros.core.scan.labels import label_convention
 
 CLASSES = context_classes(label_convention('semantickitti'))
 BUILDING, VEGETATION, POLE, ROAD, CAR = 13, 15, 18, 9, 1

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sgor_ros.commands.demo import forth_and_back
-from sgor_ros.core import se3
+from sgor_ros.core.common import se3
 from sgor_ros.evaluation.track import track_errors
 
 

@@ -6,10 +6,10 @@ from scipy.spatial.transform import Rotation
 
 from sgor_ros import preprocess
 from sgor_ros import SemanticScan
-from sgor_ros.core.correspondences import Features
-from sgor_ros.core.evidence import evidence
-from sgor_ros.core.evidence import rank
-from sgor_ros.core.evidence import view
+from sgor_ros.core.scan.features import Features
+from sgor_ros.core.trust.evidence import evidence
+from sgor_ros.core.trust.evidence import rank
+from sgor_ros.core.trust.evidence import view
 
 REACH, CELL = 0.6, 1.2
 WALL, POLE = 13, 18

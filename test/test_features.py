@@ -4,12 +4,12 @@ import open3d as o3d
 import pytest
 from scipy.spatial import cKDTree
 
-from sgor_ros.core.features import fpfh
-from sgor_ros.core.features import normals
-from sgor_ros.core.features import regional_labels
-from sgor_ros.core.neighbours import radius_neighbours
-from sgor_ros.core.voxels import one_point_voxels
-from sgor_ros.core.voxels import voxel_grid
+from sgor_ros.core.scan.descriptors import fpfh
+from sgor_ros.core.scan.descriptors import normals
+from sgor_ros.core.scan.descriptors import regional_labels
+from sgor_ros.core.scan.neighbours import radius_neighbours
+from sgor_ros.core.scan.voxels import one_point_voxels
+from sgor_ros.core.scan.voxels import voxel_grid
 
 
 @pytest.fixture(scope='module')

@@ -6,9 +6,9 @@ from scipy.spatial.transform import Rotation
 from sgor_ros import preprocess
 from sgor_ros import SemanticScan
 from sgor_ros import SgorConfig
-from sgor_ros.core.ground import fit_plane
-from sgor_ros.core.ground import segment_ground
-from sgor_ros.core.voxels import one_point_voxels
+from sgor_ros.core.scan.ground import fit_plane
+from sgor_ros.core.scan.ground import segment_ground
+from sgor_ros.core.scan.voxels import one_point_voxels
 
 ROAD, BUILDING = 9, 13    # classes inside
 

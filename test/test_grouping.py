@@ -4,9 +4,9 @@ import pytest
 from test_consistency import random_matches
 
 from sgor_ros import SgorConfig
-from sgor_ros.core.graph import consistency_graph
-from sgor_ros.core.grouping import group
-from sgor_ros.core.grouping import leading_eigenvector
+from sgor_ros.core.solver.graph import consistency_graph
+from sgor_ros.core.solver.grouping import group
+from sgor_ros.core.solver.grouping import leading_eigenvector
 
 
 def greedy(points, order, count, spacing):

@@ -5,12 +5,12 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from sgor_ros import SgorConfig
-from sgor_ros.core.consistency import FilteredGroups
-from sgor_ros.core.correspondences import Correspondences
-from sgor_ros.core.hypotheses import fit_transforms
-from sgor_ros.core.hypotheses import hypothesise
-from sgor_ros.core.refinement import distances
-from sgor_ros.core.refinement import refine
+from sgor_ros.core.matching.correspondences import Correspondences
+from sgor_ros.core.solver.consistency import FilteredGroups
+from sgor_ros.core.solver.hypotheses import fit_transforms
+from sgor_ros.core.solver.hypotheses import hypothesise
+from sgor_ros.core.solver.refinement import distances
+from sgor_ros.core.solver.refinement import refine
 
 
 def random_pose(seed):

@@ -7,7 +7,7 @@ from sgor_ros import InputError
 from sgor_ros import preprocess
 from sgor_ros import SemanticScan
 from sgor_ros import SgorConfig
-from sgor_ros.core.labels import label_convention
+from sgor_ros.core.scan.labels import label_convention
 
 CAR, ROAD, BUILDING, VEGETATION, POLE = 1, 9, 13, 15, 18    # classes inside
 CONVENTIONS = ('semantickitti', 'semantickitti_train', 'nuscenes')

@@ -75,8 +75,8 @@ def test_core_and_tracker_load_neither_ros_nor_files():
     shells = [f'sgor_ros.{name}' for name in (*SHELLS, 'world')]
     unwanted = [*ROS, *FILES - {'argparse'}, 'open3d', *shells]
     code = ('import importlib, pkgutil, sys, sgor_ros, sgor_ros.core\n'
-            'for module in pkgutil.iter_modules(sgor_ros.core.__path__):\n'
-            '    importlib.import_module(f"sgor_ros.core.{module.name}")\n'
+            'for module in pkgutil.walk_packages(sgor_ros.core.__path__, "sgor_ros.core."):\n'
+            '    importlib.import_module(module.name)\n'
             f'print(*(name for name in {unwanted} if name in sys.modules))')
     done = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True,
                           cwd=PACKAGE.parent, check=True)

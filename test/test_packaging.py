@@ -22,7 +22,7 @@ COMMANDS = {'sgor_node', 'sgor_replay', 'sgor_register', 'sgor_kitti_to_bag', 's
             'sgor_demo'}
 SITE = f'lib/python3.{sys.version_info.minor}/site-packages'
 # what a user's package finds out about its own tables
-LABELS = ('import sgor_ros; from sgor_ros.core.labels import label_convention as find;'
+LABELS = ('import sgor_ros; from sgor_ros.core.scan.labels import label_convention as find;'
           'print(sgor_ros.__file__, *[len(find(n).classes) for n in '
           '("semantickitti", "semantickitti_train", "nuscenes")])')
 

@@ -9,7 +9,7 @@ from sgor_ros import preprocess
 from sgor_ros import register
 from sgor_ros import SemanticScan
 from sgor_ros import SgorConfig
-from sgor_ros.core.threads import cores
+from sgor_ros.core.common.threads import cores
 from sgor_ros.core.warmup import warm_up
 
 

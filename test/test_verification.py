@@ -8,11 +8,11 @@ from scipy.spatial.transform import Rotation
 
 from sgor_ros import register_correspondences
 from sgor_ros import SgorConfig
-from sgor_ros.core.correspondences import Correspondences
-from sgor_ros.core.hypotheses import Hypotheses
-from sgor_ros.core.verification import ground_angles
-from sgor_ros.core.verification import truncated_distance
-from sgor_ros.core.verification import verify
+from sgor_ros.core.matching.correspondences import Correspondences
+from sgor_ros.core.solver.hypotheses import Hypotheses
+from sgor_ros.core.solver.verification import ground_angles
+from sgor_ros.core.solver.verification import truncated_distance
+from sgor_ros.core.solver.verification import verify
 
 UP = np.array([0, 0, 1.0])
 

@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from ..core.common.settings import InputError
 from ..core.config import SgorConfig
-from ..core.settings import InputError
 from ..evaluation import pairs as pairing
 from ..evaluation import plots
 from ..evaluation import report

@@ -13,7 +13,7 @@ from rosbags.typesys import get_typestore
 from rosbags.typesys import Stores
 from tqdm import tqdm
 
-from ..core.settings import InputError
+from ..core.common.settings import InputError
 from ..evaluation.track import track_errors
 from ..evaluation.track import TrackErrors
 from ..evaluation.track_plots import plot_against_truth

@@ -12,9 +12,9 @@ from typing import Any
 
 import yaml
 
-from ..core.settings import InputError
-from ..core.settings import Setting
-from ..core.settings import Settings
+from ..core.common.settings import InputError
+from ..core.common.settings import Setting
+from ..core.common.settings import Settings
 
 REFUSED = 2
 INTERRUPTED = 130

@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from ..core import se3
+from ..core.common import se3
 from ..core.config import SgorConfig
-from ..core.preprocessing import preprocess
 from ..core.registration import register
-from ..core.scan import Registration
-from ..core.scan import SemanticScan
+from ..core.result import Registration
+from ..core.scan.preprocessing import preprocess
+from ..core.scan.scan import SemanticScan
 from ..core.warmup import warm_up
 from ..io.plots import plot_registration
 from ..io.scans import read_scan

@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
+from ..core.common.settings import InputError
 from ..core.config import SgorConfig
-from ..core.labels import label_convention
-from ..core.settings import InputError
+from ..core.scan.labels import label_convention
 from ..core.warmup import warm_up
 from ..evaluation.track_plots import plot_track
 from ..io import messages

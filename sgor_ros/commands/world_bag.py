@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from ..core import se3
-from ..core.settings import InputError
+from ..core.common import se3
+from ..core.common.settings import InputError
 from ..io.bags import BagWriter
 from ..io.messages import odometry_of
 from ..io.messages import point_cloud2

@@ -3,9 +3,9 @@ from dataclasses import dataclass
 import math
 from typing import Self
 
-from .settings import InputError
-from .settings import setting
-from .settings import Settings
+from .common.settings import InputError
+from .common.settings import setting
+from .common.settings import Settings
 
 
 @dataclass(frozen=True)

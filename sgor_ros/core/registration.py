@@ -5,31 +5,31 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .acceptance import judge
-from .acceptance import judge_matches
 from .alignment import align
+from .common.stopwatch import Stopwatch
+from .common.threads import cores
 from .config import SgorConfig
-from .consistency import filter_groups
-from .correspondences import Correspondences
-from .correspondences import given_correspondences
-from .correspondences import match
-from .correspondences import overlap_region
-from .evidence import View
-from .graph import consistency_graph
-from .grouping import group
-from .hypotheses import hypothesise
-from .hypotheses import MIN_POINTS
-from .preprocessing import preprocess
-from .refinement import distances
-from .refinement import refine
-from .refinement import unobservable
-from .scan import PreparedScan
-from .scan import Registration
-from .scan import SemanticScan
-from .stopwatch import Stopwatch
-from .threads import cores
-from .verification import Normals
-from .verification import verify
+from .matching.correspondences import Correspondences
+from .matching.correspondences import given_correspondences
+from .matching.correspondences import match
+from .matching.correspondences import overlap_region
+from .result import Registration
+from .scan.preprocessing import preprocess
+from .scan.scan import PreparedScan
+from .scan.scan import SemanticScan
+from .solver.consistency import filter_groups
+from .solver.graph import consistency_graph
+from .solver.grouping import group
+from .solver.hypotheses import hypothesise
+from .solver.hypotheses import MIN_POINTS
+from .solver.refinement import distances
+from .solver.refinement import refine
+from .solver.refinement import unobservable
+from .solver.verification import Normals
+from .solver.verification import verify
+from .trust.acceptance import judge
+from .trust.acceptance import judge_matches
+from .trust.evidence import View
 
 FEW_INLIERS = 50
 """With fewer the fit is off by decimetres at the far end of a scan."""

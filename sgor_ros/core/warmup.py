@@ -2,9 +2,9 @@
 import numpy as np
 
 from .config import SgorConfig
-from .preprocessing import preprocess
 from .registration import register
-from .scan import SemanticScan
+from .scan.preprocessing import preprocess
+from .scan.scan import SemanticScan
 
 
 def warm_up(config: SgorConfig) -> None:

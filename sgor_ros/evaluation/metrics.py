@@ -5,8 +5,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from numpy.typing import NDArray
 
-from ..core import se3
-from ..core.settings import InputError
+from ..core.common import se3
+from ..core.common.settings import InputError
 
 Array = NDArray[np.float64]
 

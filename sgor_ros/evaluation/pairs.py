@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from ..core import se3
+from ..core.common import se3
+from ..core.common.settings import InputError
 from ..core.config import SgorConfig
-from ..core.scan import SemanticScan
-from ..core.settings import InputError
+from ..core.scan.scan import SemanticScan
 from ..io.scans import read_scan
 from ..io.trajectories import read_kitti
 

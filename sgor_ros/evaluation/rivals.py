@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core import se3
+from ..core.common import se3
 
 Array = NDArray[np.float64]
 Points = NDArray[np.float32]

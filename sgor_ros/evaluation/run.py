@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 from tqdm import tqdm
 
-from ..core import se3
+from ..core.common import se3
 from ..core.config import SgorConfig
-from ..core.preprocessing import preprocess
 from ..core.registration import register
-from ..core.scan import SemanticScan
+from ..core.scan.preprocessing import preprocess
+from ..core.scan.scan import SemanticScan
 from .metrics import rotation_error_deg
 from .metrics import translation_error_m
 from .pairs import Pair

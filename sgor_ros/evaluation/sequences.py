@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from ..core.config import SgorConfig
-from ..core.scan import SemanticScan
+from ..core.scan.scan import SemanticScan
 from ..core.warmup import warm_up
 from ..tracker import Tracker
 from ..tracker import TrackerConfig

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 from tqdm import tqdm
 
-from ..core import se3
+from ..core.common import se3
+from ..core.common.settings import InputError
 from ..core.config import SgorConfig
 from ..core.registration import register_correspondences
-from ..core.settings import InputError
 from .metrics import rotation_error_deg
 from .metrics import translation_error_m
 

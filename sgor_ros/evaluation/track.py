@@ -4,7 +4,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core import se3
+from ..core.common import se3
 from .metrics import consecutive_errors
 from .metrics import Drift
 from .metrics import drift

@@ -17,7 +17,7 @@ from rosbags.rosbag2 import WriterError
 from rosbags.typesys import get_typestore
 from rosbags.typesys import Stores
 
-from ..core.settings import InputError
+from ..core.common.settings import InputError
 from .messages import stamp_ns_of
 from .pointcloud2 import field_names
 

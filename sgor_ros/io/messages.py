@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from ..core import se3
-from ..core.scan import Registration
+from ..core.common import se3
+from ..core.result import Registration
 from ..tracker import TrackedScan
 from .pointcloud2 import encode
 

@@ -7,11 +7,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core import se3
-from ..core.ground import Ground
-from ..core.scan import Registration
-from ..core.scan import SemanticScan
-from ..core.settings import InputError
+from ..core.common import se3
+from ..core.common.settings import InputError
+from ..core.result import Registration
+from ..core.scan.ground import Ground
+from ..core.scan.scan import SemanticScan
 
 Array = NDArray[np.float64]
 

@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 from numpy.typing import NDArray
 
-from ..core.checks import as_labels
-from ..core.checks import as_points
-from ..core.scan import SemanticScan
-from ..core.settings import InputError
+from ..core.common.checks import as_labels
+from ..core.common.checks import as_points
+from ..core.common.settings import InputError
+from ..core.scan.scan import SemanticScan
 
 # the datatypes of sensor_msgs/msg/PointField
 FORMATS = {1: 'i1', 2: 'u1', 3: 'i2', 4: 'u2', 5: 'i4', 6: 'u4', 7: 'f4', 8: 'f8'}

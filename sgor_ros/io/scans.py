@@ -13,8 +13,8 @@ import zipfile
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.scan import SemanticScan
-from ..core.settings import InputError
+from ..core.common.settings import InputError
+from ..core.scan.scan import SemanticScan
 from .pointcloud2 import whole_numbers
 
 LABEL_NAMES = ('label', 'labels', 'class')

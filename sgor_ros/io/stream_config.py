@@ -1,9 +1,9 @@
 """What node and replay need to know of the clouds that they take and the poses they give."""
 from dataclasses import dataclass
 
-from ..core.settings import InputError
-from ..core.settings import setting
-from ..core.settings import Settings
+from ..core.common.settings import InputError
+from ..core.common.settings import setting
+from ..core.common.settings import Settings
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from ..core.settings import InputError
+from ..core.common.settings import InputError
 
 Pose = NDArray[np.float64]
 

@@ -14,7 +14,7 @@ from sensor_msgs.msg import PointCloud2
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import MarkerArray
 
-from ..core.settings import InputError
+from ..core.common.settings import InputError
 from ..core.warmup import warm_up
 from ..io import messages
 from ..io.pointcloud2 import decode

@@ -20,13 +20,13 @@ from rclpy.exceptions import ParameterException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
+from ..core.common.settings import InputError
+from ..core.common.settings import Setting
+from ..core.common.settings import setting
+from ..core.common.settings import Settings
+from ..core.common.settings import Value
 from ..core.config import SgorConfig
-from ..core.labels import label_convention
-from ..core.settings import InputError
-from ..core.settings import Setting
-from ..core.settings import setting
-from ..core.settings import Settings
-from ..core.settings import Value
+from ..core.scan.labels import label_convention
 from ..io.stream_config import StreamConfig
 from ..tracker import TrackerConfig
 

@@ -3,7 +3,7 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
 
-from ..core.settings import InputError
+from ..core.common.settings import InputError
 from ..io import messages
 from ..tracker import TrackedScan
 from .types import ros_type

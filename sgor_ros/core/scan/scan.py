@@ -1,20 +1,19 @@
-"""The way in (`SemanticScan`), what is made of it, and the way out (`Registration`)."""
+"""The way in (`SemanticScan`), and what is made of it (`PreparedScan`)."""
 from dataclasses import dataclass
-from dataclasses import field
 
 import numpy as np
 from numpy.typing import ArrayLike
 from numpy.typing import NDArray
 
-from .alignment import Surface
-from .checks import as_labels
-from .checks import as_points
-from .checks import finite_rows
-from .config import SgorConfig
-from .correspondences import Features
-from .evidence import View
+from ..alignment import Surface
+from ..common.checks import as_labels
+from ..common.checks import as_points
+from ..common.checks import finite_rows
+from ..common.settings import InputError
+from ..config import SgorConfig
+from ..trust.evidence import View
+from .features import Features
 from .ground import Ground
-from .settings import InputError
 
 
 @dataclass(frozen=True, eq=False, init=False)
@@ -85,56 +84,3 @@ class PreparedScan:
     surface: Surface | None
     warnings: tuple[str, ...]
     timings: dict[str, float]
-
-
-@dataclass(frozen=True, eq=False)
-class Registration:
-    """What `register` found out.
-
-    Attributes
-    ----------
-    success : bool
-    reason : str
-        Why not, in words; empty on success.
-    T_target_source : (4, 4) float64 or None
-        Maps source points into the target; None where there is not even a candidate. Without
-        success it is the refused candidate, to look at and not to use.
-    confidence : float
-        0 to 1: evidence that the transformation is right.
-    source_points, target_points : (K, 3) float64
-        The correspondences, metres.
-    inliers : (K,) bool
-        Those that agree with the transformation.
-    covariance : (6, 6) float64 or None
-        Of (x, y, z, rotation about x, y, z) in the target frame, m^2 and rad^2.
-    hypotheses : (H, 4, 4) float64
-        Candidates of the groups, T_target_source.
-    passed_ground_check : (H,) bool
-        Which of them survived the first stage of verification.
-    best_hypothesis : int
-        Which of them won the second stage; -1 if none.
-    source_ground, target_ground : Ground or None
-    evidence : dict of str to float
-        What the confidence was judged by.
-    warnings : tuple of str
-        What was odd about the scans, in words.
-    timings : dict of str to float
-        Stage to seconds.
-    """
-
-    success: bool
-    reason: str
-    T_target_source: NDArray[np.float64] | None
-    source_points: NDArray[np.float64]
-    target_points: NDArray[np.float64]
-    inliers: NDArray[np.bool_]
-    confidence: float = 0.0
-    covariance: NDArray[np.float64] | None = None
-    hypotheses: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 4, 4)))
-    passed_ground_check: NDArray[np.bool_] = field(default_factory=lambda: np.empty(0, np.bool_))
-    best_hypothesis: int = -1
-    source_ground: Ground | None = None
-    target_ground: Ground | None = None
-    evidence: dict[str, float] = field(default_factory=dict)
-    warnings: tuple[str, ...] = ()
-    timings: dict[str, float] = field(default_factory=dict)

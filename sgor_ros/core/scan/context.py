@@ -10,8 +10,8 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from .config import SgorConfig
-from .features import unit_rows
+from ..config import SgorConfig
+from .descriptors import unit_rows
 from .ground import Ground
 from .labels import LabelConvention
 from .labels import UNLABELLED

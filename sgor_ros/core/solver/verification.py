@@ -5,10 +5,10 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from .config import SgorConfig
-from .correspondences import Correspondences
-from .evidence import rank
-from .evidence import View
+from ..config import SgorConfig
+from ..matching.correspondences import Correspondences
+from ..trust.evidence import rank
+from ..trust.evidence import View
 from .hypotheses import Hypotheses
 
 Normals = tuple[NDArray[np.float64], NDArray[np.float64]]

@@ -6,17 +6,20 @@ from numpy.typing import ArrayLike
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from .alignment import surface
-from .checks import finite_points
-from .config import SgorConfig
+from ..alignment import surface
+from ..common.checks import finite_points
+from ..common.settings import InputError
+from ..common.stopwatch import Stopwatch
+from ..common.threads import cores
+from ..config import SgorConfig
+from ..trust.evidence import view
 from .context import context_classes
 from .context import semantic_context
-from .correspondences import Features
-from .evidence import view
-from .features import fpfh
-from .features import normals
-from .features import regional_labels
-from .features import unit_rows
+from .descriptors import fpfh
+from .descriptors import normals
+from .descriptors import regional_labels
+from .descriptors import unit_rows
+from .features import Features
 from .ground import Ground
 from .ground import segment_ground
 from .labels import label_convention
@@ -25,9 +28,6 @@ from .labels import UNLABELLED
 from .neighbours import radius_neighbours
 from .scan import PreparedScan
 from .scan import SemanticScan
-from .settings import InputError
-from .stopwatch import Stopwatch
-from .threads import cores
 from .voxels import voxel_grid
 from .voxels import VoxelCloud
 

@@ -2,9 +2,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from . import se3
-from .config import SgorConfig
-from .correspondences import Correspondences
+from ..common import se3
+from ..config import SgorConfig
+from ..matching.correspondences import Correspondences
 from .hypotheses import fit_transforms
 from .hypotheses import MIN_POINTS
 

@@ -12,8 +12,8 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from .config import SgorConfig
-from .correspondences import Correspondences
+from ..config import SgorConfig
+from ..matching.correspondences import Correspondences
 
 PREFILTER_SLACK = 1e-3
 """Metres: float32 finds the candidate pairs, float64 decides. In a scan of 100 m the former errs

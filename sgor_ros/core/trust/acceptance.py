@@ -1,11 +1,11 @@
 """Whether to trust a registration: confidence from evidence (beyond the paper)."""
 from dataclasses import replace
 
-from .config import SgorConfig
+from ..config import SgorConfig
+from ..result import Registration
+from ..solver.verification import near_counts
 from .evidence import evidence
 from .evidence import View
-from .scan import Registration
-from .verification import near_counts
 
 
 def judge_matches(result: Registration, config: SgorConfig) -> Registration:

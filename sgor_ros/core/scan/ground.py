@@ -5,7 +5,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from .config import SgorConfig
+from ..config import SgorConfig
 from .voxels import VoxelCloud
 
 TRIALS, SAMPLE, SEED = 200, 1000, 0

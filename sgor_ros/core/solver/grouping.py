@@ -5,8 +5,8 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from .config import SgorConfig
-from .correspondences import Correspondences
+from ..config import SgorConfig
+from ..matching.correspondences import Correspondences
 from .graph import ConsistencyGraph
 from .graph import U64
 

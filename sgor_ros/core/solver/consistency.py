@@ -9,7 +9,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from .correspondences import Correspondences
+from ..matching.correspondences import Correspondences
 from .graph import ConsistencyGraph
 from .grouping import Groups
 from .grouping import squared_distance

@@ -6,17 +6,18 @@ import numpy as np
 from numpy.typing import ArrayLike
 from numpy.typing import NDArray
 
-from .checks import as_labels
-from .checks import finite_points
-from .config import SgorConfig
-from .context import OCTAVES
-from .features import regional_labels
-from .labels import label_convention
-from .labels import LabelConvention
-from .labels import UNLABELLED
-from .neighbours import radius_neighbours
-from .settings import InputError
-from .voxels import one_point_voxels
+from ..common.checks import as_labels
+from ..common.checks import finite_points
+from ..common.settings import InputError
+from ..config import SgorConfig
+from ..scan.context import OCTAVES
+from ..scan.descriptors import regional_labels
+from ..scan.features import Features
+from ..scan.labels import label_convention
+from ..scan.labels import LabelConvention
+from ..scan.labels import UNLABELLED
+from ..scan.neighbours import radius_neighbours
+from ..scan.voxels import one_point_voxels
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,38 +43,6 @@ class Correspondences:
 
     def __len__(self) -> int:
         return len(self.source)
-
-
-@dataclass(frozen=True, eq=False)
-class Features:
-    """The keypoints of one scan that may be matched.
-
-    Attributes
-    ----------
-    points : (V, 3) float64
-        Metres.
-    labels, regional : (V,) uint8
-        Class inside by vote of the voxel, and of the neighbourhood.
-    descriptors : (V, D) float32
-        Unit rows.
-    heights : (V,) float64 or None
-        Heights over the ground plane, metres; None without a ground plane.
-    context : (V, E) float32 or None
-        From `context.semantic_context`; None without a ground plane or where it is off.
-    """
-
-    points: NDArray[np.float64]
-    labels: NDArray[np.uint8]
-    regional: NDArray[np.uint8]
-    descriptors: NDArray[np.float32]
-    heights: NDArray[np.float64] | None = None
-    context: NDArray[np.float32] | None = None
-
-    def __getitem__(self, rows: NDArray[np.intp] | NDArray[np.bool_]) -> 'Features':
-        return Features(self.points[rows], self.labels[rows], self.regional[rows],
-                        self.descriptors[rows],
-                        None if self.heights is None else self.heights[rows],
-                        None if self.context is None else self.context[rows])
 
 
 def given_correspondences(source_points: ArrayLike, target_points: ArrayLike,

@@ -12,14 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 import yaml
 
-from .settings import InputError
+from ..common.settings import InputError
 
 UNLABELLED = 0
 """The class inside of everything without a label; it votes for nothing."""
 
 _HOME = Path(__file__).resolve()
 # beside a checkout's package, or under the prefix that it was installed to
-_TABLES = (_HOME.parents[2] / 'config/labels',
+_TABLES = (_HOME.parents[3] / 'config/labels',
            *(folder / 'share/sgor_ros/config/labels' for folder in _HOME.parents))
 
 

@@ -9,7 +9,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from .angles import atan2
+from ..common.angles import atan2
 from .neighbours import Neighbours
 from .voxels import VoxelCloud
 from .voxels import winning_labels

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..matching.correspondences import Correspondences
 from .consistency import FilteredGroups
-from .correspondences import Correspondences
 
 MIN_POINTS = 3
 """A rigid transformation needs three points that are not on a line."""

@@ -11,9 +11,9 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from . import se3
-from .angles import atan2
-from .correspondences import Features
+from ..common import se3
+from ..common.angles import atan2
+from ..scan.features import Features
 
 AZIMUTHS, ELEVATIONS = 360, 180
 """Cells of the range image: 1 degree, wider than the gaps between beams."""

@@ -1,0 +1,1 @@
+"""What every room uses: settings, checks at the door, transformations, threads."""

@@ -1,0 +1,1 @@
+"""From correspondences to one transformation (paper, Sec. III-B to III-E)."""
