@@ -33,7 +33,7 @@ def corridor(rng: np.random.Generator) -> Place:
     pitch = float(rng.choice([2.8, 3.0, 3.2]))
     depth, width = float(rng.choice([0.08, 0.15, 0.25])), float(rng.choice([0.9, 1.0]))
     plot = Plot(rng, straight(100.0))
-    plot.floor(OTHER_GROUND, (-_HALF, _HALF, -half, half))
+    plot.floor(OTHER_GROUND, (-_HALF, _HALF, -half - depth, half + depth))
     plot.add(OTHER_STRUCTURE, extrude([(-half, top), (half, top)], -_HALF, _HALF))
     for turn, y in ((facing_left, -half), (facing_right, half)):
         begins = np.arange(-_HALF + pitch * rng.choice([0.5, 1.0]), _HALF - pitch, pitch)

@@ -64,13 +64,13 @@ def road_tunnel(rng: np.random.Generator) -> Place:
     pitch, high = float(rng.choice([10.0, 12.5, 15.0])), rng.uniform(1.8, 2.4)
     for side in (-1, 1):
         _lamps(plot, pitch, side * half, side, rng.uniform(0.6, 1.2), high)
-    x = float(rng.uniform(0.0, 20.0)) - _HALF
+    x = -_HALF
     while x < _HALF:
+        x += float(rng.uniform(7.0, 45.0))
         # In the other lane, or at the very edge, so that there is a way past them.
-        y = rng.choice([0.45 * half - rng.uniform(0.2, 0.5), kerb + 1.0 - half])
+        y = float(rng.choice([0.45 * half - rng.uniform(0.2, 0.5), kerb + 1.0 - half]))
         if abs(y - plot.path[0, 1]) > 1.5:
             plot.put(car(rng), (x, y), rng.choice([0.0, np.pi]) + rng.normal(0.0, 0.03))
-        x += float(rng.uniform(7.0, 45.0))
     return finish(plot, (-_CORE, _CORE, kerb - half + 0.6, half - kerb - 0.6))
 
 
