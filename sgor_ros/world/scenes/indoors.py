@@ -11,6 +11,7 @@ from ..labels import OTHER_STRUCTURE
 from ..labels import PARKING
 from ..objects import car
 from ..shapes import box
+from ..shapes import place
 from .place import finish
 from .place import Place
 from .place import straight
@@ -55,9 +56,10 @@ def garage(rng: np.random.Generator, full: float = 0.0) -> Place:
     plot.floor(PARKING, (-half, half, -wide, wide))
     plot.add(OTHER_STRUCTURE, extrude([(-wide, top), (wide, top)], -half, half))
     for y in (-wide, wide):
-        plot.add(BUILDING, box((-half, half), (y - 0.1, y + 0.1), (0.0, top)))
+        plot.add(BUILDING, extrude([(y, 0.0), (y, top)], -half, half))
     for x in (-half, half):
-        plot.add(BUILDING, box((x - 0.1, x + 0.1), (-wide, wide), (0.0, top)))
+        wall = extrude([(x, 0.0), (x, top)], -wide, wide)
+        plot.add(BUILDING, place(wall, (0.0, 0.0, 0.0), np.pi / 2))
     pillar = [(OTHER_STRUCTURE, box((-0.2, 0.2), (-0.3, 0.3), (0.0, top)))]
     lines = np.arange(fields + 1) * bay - half
     for aisle in aisles:

@@ -69,9 +69,9 @@ def parking(rng: np.random.Generator, *, jittered: bool = False) -> Place:
     plot = Plot(rng, straight(140.0))
     plot.floor(PARKING, (-140.0, 140.0, -110.0, 110.0))
     pool = [car(rng) for _ in range(40 if jittered else 1)]
-    for middle in module * np.arange(-4, 5):
+    for middle in module * np.arange(-5, 6):
         for side in (-1, 1):
-            for x in _STALL * np.arange(-40, 41):
+            for x in _STALL * np.arange(-54, 55):
                 spot = np.array([x, middle + side * (_AISLE / 2 + _DEEP / 2)])
                 if not jittered:
                     plot.put(pool[0], spot, side * np.pi / 2)
@@ -80,8 +80,8 @@ def parking(rng: np.random.Generator, *, jittered: bool = False) -> Place:
                              spot + rng.normal(0.0, (0.1, 0.25)),
                              rng.choice([-1, 1]) * np.pi / 2 + rng.normal(0.0, 0.04))
     mast = lamp_post(rng)
-    for middle in module * (np.arange(-4, 4) + 0.5):
-        for x in 10 * _STALL * np.arange(-4, 4) + _STALL / 2:
+    for middle in module * (np.arange(-5, 5) + 0.5):
+        for x in 10 * _STALL * np.arange(-5, 5) + _STALL / 2:
             plot.put(mast, (x, middle))
     return finish(plot, (-35.0, 35.0, -30.0, 30.0))
 

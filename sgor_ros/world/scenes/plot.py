@@ -82,11 +82,10 @@ class Plot:
 
 
 def clear_of(boxes: Array, xy: Array, radius: float) -> npt.NDArray[np.bool_]:
-    """Whether points (N, 2) are farther than a radius, m, from boxes (B, 7), each; (N,)."""
-    free = np.ones(len(xy), bool)
-    for x, y, yaw, *ends in boxes:
-        cos, sin = np.cos(yaw), np.sin(yaw)
-        local = (xy - (x, y)) @ np.array([[cos, -sin], [sin, cos]])
-        nearest = np.clip(local, ends[::2], ends[1::2])
-        free &= np.linalg.norm(local - nearest, axis=1) > radius
-    return free
+    """Whether points (N, 2) are farther than a radius, m, from all boxes (B, 7); (N,)."""
+    away = xy[:, None] - boxes[:, :2]
+    cos, sin = np.cos(boxes[:, 2]), np.sin(boxes[:, 2])
+    local = np.stack([cos * away[..., 0] + sin * away[..., 1],
+                      cos * away[..., 1] - sin * away[..., 0]], axis=-1)
+    nearest = np.clip(local, boxes[:, 3::2], boxes[:, 4::2])
+    return np.asarray((np.linalg.norm(local - nearest, axis=-1) > radius).all(axis=1))

@@ -61,8 +61,10 @@ def facade(rng: np.random.Generator, cars: str = 'none') -> Place:
     plot.floor(ROAD, (-_FACADE, _FACADE, walk, far))
     plot.floor(TERRAIN, (-_FACADE, _FACADE, far, far + 60.0))
     if rng.random() < 0.5:
-        plot.add(OTHER_STRUCTURE, box((-_FACADE, _FACADE), (far + 2.0, far + 2.3),
-                                      (0.0, rng.uniform(0.8, 1.6))))
+        top = rng.uniform(0.8, 1.6)
+        plot.add(OTHER_STRUCTURE, extrude(
+            [(far + 2.0, 0.0), (far + 2.0, top), (far + 2.3, top), (far + 2.3, 0.0)],
+            -_FACADE, _FACADE))
     model, line = car(rng), walk + 1.1
     if cars == 'regular':
         for x in np.arange(-_FACADE, _FACADE - bay, bay / 2):
@@ -97,7 +99,8 @@ def highway(rng: np.random.Generator) -> Place:
     for y in (-half - 0.6, -median / 2, median / 2, half + 0.6):
         _rail(plot, y)
     post = tube((0.0, 0.0, -0.3), (0.0, 0.0, 1.05), (0.07, 0.06))
-    for x in np.arange(-_HIGHWAY, _HIGHWAY, _POST_PITCH):
+    for x in _POST_PITCH * np.arange(-round(_HIGHWAY / _POST_PITCH),
+                                     round(_HIGHWAY / _POST_PITCH) + 1):
         for side in (-1, 1):
             plot.add(POLE, place(post, (x, side * (half + 1.3), 0.0)))
     pool = [bush(rng) for _ in range(30)]

@@ -11,7 +11,7 @@ from ..shapes import relief
 
 Array = npt.NDArray[np.float64]
 
-_PIECE = 20.0  # m, so that rays meet triangles of a sane shape
+_PIECE = 5.0  # m, so that no triangle is a sliver
 
 
 def extrude(profile: npt.ArrayLike, start: float, end: float) -> Array:
