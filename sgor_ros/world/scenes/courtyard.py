@@ -24,12 +24,15 @@ Array = npt.NDArray[np.float64]
 
 def courtyard(rng: np.random.Generator) -> Place:
     """Build a yard of 18 x 20 m or so, with windows, doors, furniture and plants."""
-    long, wide = rng.uniform(17.0, 23.0), rng.uniform(15.0, 20.0)
+    long = rng.uniform(17.0, 23.0)
+    wide = long - rng.uniform(0.0, 4.0)
     plot = Plot(rng, _round(long / 2 - 4.0, wide / 2 - 4.0))
-    storeys = int(rng.integers(2, 5))
-    for yaw, length, away in ((0.0, long, wide), (np.pi / 2, wide, long),
-                              (np.pi, long, wide), (-np.pi / 2, wide, long)):
-        wall = house_front(rng, length, storeys)
+    storeys, designs = int(rng.integers(2, 5)), rng.integers(2**32, size=4)
+    own = int(rng.choice([1, 2, 4]))    # one design for all sides, for opposite ones, or none
+    for side in range(4):
+        length, away = (long, wide) if side % 2 == 0 else (wide, long)
+        wall = house_front(np.random.default_rng(designs[side % own]), length, storeys)
+        yaw = side * np.pi / 2
         plot.add(BUILDING, place(wall, np.array([np.sin(yaw), -np.cos(yaw), 0.0]) * away / 2,
                                  yaw))
     plot.floor(SIDEWALK, (-long / 2 - 1.5, long / 2 + 1.5, -wide / 2 - 1.5, wide / 2 + 1.5))

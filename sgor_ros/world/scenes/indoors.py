@@ -24,15 +24,15 @@ from .walls import niches
 Array = npt.NDArray[np.float64]
 
 _HALF = 165.0  # m, half a corridor; the sensor stays within 50 m of the middle
+_CORRIDORS = ((1.1, 2.5, 3.0, 0.15, 0.9), (1.3, 2.8, 3.2, 0.25, 1.0), (1.1, 2.5, 2.8, 0.08, 0.9))
+"""Half width, height; pitch, depth and width of the doors, m: standards, as in buildings."""
 _STALL = 2.5  # m
 _AISLE, _DEEP = 6.2, 5.0  # m
 
 
 def corridor(rng: np.random.Generator) -> Place:
     """Build a corridor with a door every 3 m or so on either side, all alike."""
-    half, top = float(rng.choice([0.9, 1.1, 1.3])), float(rng.choice([2.5, 2.8]))
-    pitch = float(rng.choice([2.8, 3.0, 3.2]))
-    depth, width = float(rng.choice([0.08, 0.15, 0.25])), float(rng.choice([0.9, 1.0]))
+    half, top, pitch, depth, width = _CORRIDORS[int(rng.integers(len(_CORRIDORS)))]
     plot = Plot(rng, straight(100.0))
     plot.floor(OTHER_GROUND, (-_HALF, _HALF, -half - depth, half + depth))
     plot.add(OTHER_STRUCTURE, extrude([(-half, top), (half, top)], -_HALF, _HALF))

@@ -30,6 +30,7 @@ Array = npt.NDArray[np.float64]
 
 _CORE = 60.0  # m
 _FACADE = 240.0  # m, half its length
+_DESIGNS = 4
 _HIGHWAY = 340.0  # m, half its length
 _POST_PITCH = 50.0  # m
 _RAIL_PITCH = 4.0  # m
@@ -50,10 +51,12 @@ def facade(rng: np.random.Generator, cars: str = 'none') -> Place:
     Place
         The facade looks on the road from the right.
     """
-    bay = float(rng.choice([9.0, 10.0, 11.0]))
-    walk, road = float(rng.choice([2.5, 3.0])), float(rng.choice([7.0, 9.0]))
+    # Blocks are built after a few designs, so that many facades are alike.
+    design = np.random.default_rng(int(rng.integers(_DESIGNS)))
+    bay, walk = float(design.choice([9.0, 10.0, 11.0])), float(design.choice([2.5, 3.0]))
+    road = float(rng.choice([7.0, 9.0]))
     plot = Plot(rng, straight(180.0, walk + road - 2.0))
-    front = house_front(rng, bay, int(rng.integers(3, 6)))
+    front = house_front(design, bay, int(design.integers(3, 6)))
     for x in bay * np.arange(-round(_FACADE / bay), round(_FACADE / bay)):
         plot.add(BUILDING, place(front, (x, 0.0, 0.0)))
     far = walk + road

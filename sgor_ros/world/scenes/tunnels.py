@@ -25,14 +25,15 @@ Array = npt.NDArray[np.float64]
 _HALF = 320.0  # m; the sensor stays within 100 m of the middle, so no end is in reach
 _CORE = 60.0  # m
 _PATH = 180.0  # m
+_SECTIONS = ((4.9, 2.2, 0.8), (5.5, 1.6, 1.0))
+"""Half width, height of the upright wall, walkway, m: standards, so that many are alike."""
 
 
 def tunnel(rng: np.random.Generator, lamp_pitch: float | None = None) -> Place:
     """Build a straight tunnel under a vault, with lamps at a pitch (m) along its walls or none."""
-    # Built to one of a few standards: two tunnels often share their section.
-    half = float(rng.choice([4.4, 4.9, 5.5])) + rng.choice([0.0, rng.normal(0.0, 0.1)])
-    wall = float(rng.choice([1.6, 2.2]))
-    kerb = float(rng.choice([0.8, 1.0]))
+    half, wall, kerb = _SECTIONS[int(rng.integers(len(_SECTIONS)))]
+    if rng.random() < 0.3:
+        half += rng.normal(0.0, 0.1)
     plot = Plot(rng, straight(_PATH, -0.25 * half))
     _deck(plot, half, kerb)
     angle = np.linspace(0.0, np.pi, 25)
