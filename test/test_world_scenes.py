@@ -3,9 +3,11 @@ import numpy as np
 import open3d as o3d
 import pytest
 
+from sgor_ros.commands.demo import BAG_SCANS
 from sgor_ros.core.scan.labels import label_convention
 from sgor_ros.world import Lidar
 from sgor_ros.world import scenes
+from sgor_ros.world import simulate
 from sgor_ros.world.scenes import KINDS
 from sgor_ros.world.scenes.plot import clear_of
 
@@ -245,3 +247,21 @@ def test_highway_has_rails_and_posts_at_their_pitch():
             assert distance_to_surfaces(road, [(x, y, 0.5)])[0] < 0.1
             assert distance_to_surfaces(road, [(x + 25.0, y, 0.9)])[0] > 0.3
     assert {FENCE, POLE} <= set(road.label_of_geometry.tolist())
+
+
+def test_the_world_is_driven_through_in_any_place():
+    coarse = Lidar(beams=16, columns=180)
+    for place, step in (('street', 0.6), ('highway', 2.5), ('corridor', 0.3)):
+        stamps, points, labels, poses = zip(*simulate(3, 1, coarse, place=place), strict=True)
+        np.testing.assert_allclose(stamps, (0.0, 0.1, 0.2))
+        way = np.linalg.norm(np.diff(np.array(poses)[:, :3, 3], axis=0), axis=1)
+        np.testing.assert_allclose(way, step, rtol=0.03)
+        assert all(len(p) == len(ids) > 500 for p, ids in zip(points, labels, strict=True))
+    faster = [pose for *_, pose in simulate(2, 1, coarse, 12.0, 'highway')]
+    assert np.linalg.norm(faster[1][:3, 3] - faster[0][:3, 3]) == pytest.approx(1.2, rel=0.01)
+
+
+@pytest.mark.parametrize('kind', KINDS)
+def test_every_place_has_way_enough_for_a_bag_of_the_demo(kind):
+    for seed in range(3):
+        assert len(scenes.drive(scenes.make(kind, seed), BAG_SCANS, KINDS[kind].step)) == BAG_SCANS

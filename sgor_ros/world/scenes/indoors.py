@@ -48,7 +48,7 @@ def garage(rng: np.random.Generator, full: float = 0.0) -> Place:
     """Build a storey of a parking garage, a share of its stalls full of cars."""
     modules, module = int(rng.integers(3, 5)), _AISLE + 2 * _DEEP
     bay = float(rng.choice([2, 3])) * _STALL + 0.3
-    fields = round(rng.uniform(105.0, 145.0) / bay)
+    fields = round(rng.uniform(130.0, 165.0) / bay)
     half, wide = fields * bay / 2, modules * module / 2
     top = float(rng.choice([2.4, 2.8]))
     aisles = (np.arange(modules) + 0.5) * module - wide
