@@ -10,8 +10,8 @@ import numpy.typing as npt
 from . import scenes
 from .lidar import Lidar
 from .scene import Scene
-from .scene import street_scene
-from .trajectory import loop_trajectory
+from .street import loop_trajectory
+from .street import street_scene
 
 __all__ = ['STREET', 'Lidar', 'Scene', 'loop_trajectory', 'scenes', 'simulate', 'street_scene']
 
@@ -57,7 +57,7 @@ def simulate(
     scene: Scene
     if place == STREET:
         scene = street = street_scene(seed)
-        poses = loop_trajectory(street, n_scans, speed or _SPEED, _PERIOD)
+        poses = loop_trajectory(street, n_scans, _SPEED if speed is None else speed, _PERIOD)
     else:
         scene = there = scenes.make(place, seed)
         step = scenes.KINDS[place].step if speed is None else speed * _PERIOD

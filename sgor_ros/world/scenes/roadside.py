@@ -44,7 +44,7 @@ def facade(rng: np.random.Generator, cars: str = 'none') -> Place:
     rng : numpy.random.Generator
         Source of chance.
     cars : str
-        'none'; 'regular': two before each bay, all alike; 'random': any, with gaps.
+        'none'; 'regular': one before each bay, all alike; 'random': any, with gaps.
 
     Returns
     -------
@@ -70,8 +70,8 @@ def facade(rng: np.random.Generator, cars: str = 'none') -> Place:
             -_FACADE, _FACADE))
     model, line = car(rng), walk + 1.1
     if cars == 'regular':
-        for x in np.arange(-_FACADE, _FACADE - bay, bay / 2):
-            plot.put(model, (x + bay / 4, line))
+        for x in bay * np.arange(-round(_FACADE / bay), round(_FACADE / bay)):
+            plot.put(model, (x, line))
     elif cars == 'random':
         x = -_FACADE
         while x < _FACADE:

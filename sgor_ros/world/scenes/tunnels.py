@@ -41,10 +41,11 @@ def tunnel(rng: np.random.Generator, lamp_pitch: float | None = None) -> Place:
     plot.add(OTHER_STRUCTURE, extrude([(half, 0.0), *vault, (-half, 0.0)], -_HALF, _HALF))
     if lamp_pitch:
         sides = [(-1,), (1,), (-1, 1)][int(rng.integers(3))]
-        long, high = rng.uniform(0.6, 1.2), rng.uniform(1.7, 2.3)
+        # A narrow sensor sees no ceiling: they hang where it looks.
+        size, high = _lamp(rng), rng.uniform(1.3, 2.2)
         for side in sides:
             y = side * half * np.sqrt(1 - max(0.0, (high - wall) / (6.6 - wall)) ** 2)
-            _lamps(plot, lamp_pitch, y, side, long, high)
+            _lamps(plot, lamp_pitch, y, side, size, high)
     return finish(plot, (-_CORE, _CORE, kerb - half + 0.6, half - kerb - 0.6))
 
 
@@ -64,7 +65,7 @@ def road_tunnel(rng: np.random.Generator) -> Place:
     plot.add(OTHER_STRUCTURE, extrude([(-half, top), (half, top)], -_HALF, _HALF))
     pitch, high = float(rng.choice([10.0, 12.5, 15.0])), rng.uniform(1.8, 2.4)
     for side in (-1, 1):
-        _lamps(plot, pitch, side * half, side, rng.uniform(0.6, 1.2), high)
+        _lamps(plot, pitch, side * half, side, _lamp(rng), high)
     x = -_HALF
     while x < _HALF:
         x += float(rng.uniform(7.0, 45.0))
@@ -84,9 +85,15 @@ def _deck(plot: Plot, half: float, kerb: float) -> None:
                                     (side * half, 0.18)], -_HALF, _HALF))
 
 
-def _lamps(plot: Plot, pitch: float, y: float, side: int, long: float, high: float) -> None:
-    """Hang boxes on a wall at y, all alike, from one end to the other."""
-    inner = y - side * 0.3
+def _lamp(rng: np.random.Generator) -> Array:
+    """Draw length, depth and height of a lamp with its casing, m."""
+    return rng.uniform((0.6, 0.2, 0.25), (1.8, 0.4, 0.6))
+
+
+def _lamps(plot: Plot, pitch: float, y: float, side: int, size: Array, high: float) -> None:
+    """Hang boxes of a size on a wall at y, all alike, from one end to the other."""
+    long, deep, tall = size
+    inner = y - side * deep
     for x in np.arange(-_HALF, _HALF, pitch):
         plot.add(OTHER_OBJECT, box((x - long / 2, x + long / 2), (min(y, inner), max(y, inner)),
-                                   (high - 0.15, high + 0.15)))
+                                   (high - tall / 2, high + tall / 2)))

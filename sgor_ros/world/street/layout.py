@@ -10,8 +10,8 @@ import numpy.typing as npt
 from scipy.ndimage import gaussian_filter1d
 from scipy.spatial import cKDTree
 
-from .waves import draw_waves
-from .waves import wave_sum
+from ..waves import draw_waves
+from ..waves import wave_sum
 
 Array = npt.NDArray[np.float64]
 
