@@ -1,11 +1,8 @@
 """The node as users have it: a process of its own, real DDS, real clouds."""
 from importlib.util import find_spec
 from pathlib import Path
-import re
-import signal
 import subprocess
 import sys
-import time
 
 import numpy as np
 import pytest
@@ -372,27 +369,6 @@ def test_real_scans_at_ten_hertz(partner, kitti):
     assert int(after['received']) - int(before['received']) == len(kitti) - 1
     assert len(partner.odometry) == len(kitti) - replaced
     assert_good_end(partner.odometry[-1], kitti)
-
-
-@pytest.mark.parametrize(('how', 'times'), [(signal.SIGINT, 1), (signal.SIGINT, 2),
-                                             (signal.SIGTERM, 1)])
-def test_a_signal_at_work_ends_it_cleanly(domain, street, tmp_path, how, times):
-    node = NodeProcess(domain, tmp_path / 'log', '-r', '__ns:=/ending')
-    partner = ros.Partner(domain, '/ending/')
-    try:
-        partner.wait_for_node()
-        partner.play(ros.stamped(clouds_of(street[:4])), 0.02)
-        partner.spin_until(lambda: partner.diagnostics)
-    finally:
-        for _ in range(times):
-            node.process.send_signal(how)
-            time.sleep(0.02)
-        code = node.process.wait(30)
-        partner.close()
-    assert code == 0
-    last = node.log.read_text().splitlines()[-1]
-    assert re.fullmatch(r'received \d, processed \d, replaced \d, failed 0', last)
-    assert 'Traceback' not in node.log.read_text()
 
 
 def test_users_files_namespace_and_a_best_effort_driver(domain, street, tmp_path):
