@@ -169,10 +169,13 @@ def test_odometry_has_pose_covariance_and_twist_where_ros_has_them():
     assert message.twist.twist.angular.z == 5.0
 
 
-def test_unknown_covariance_is_marked():
+def test_what_is_unknown_weighs_nothing_in_any_axis():
     message = messages.odometry(bag_type, tracked(covariance=None), 'odom', 'lidar')
-    assert message.pose.covariance[0] == -1.0
-    assert message.twist.covariance[0] == -1.0
+    for part in (message.pose, message.twist):
+        # a filter inverts it: no axis may be exact, none may be negative
+        information = np.linalg.inv(part.covariance.reshape(6, 6))
+        assert (np.linalg.eigvalsh(information) > 0).all()
+        assert np.abs(information).max() < 1e-5
 
 
 def test_lines_of_inliers_have_no_length_in_the_odom_frame():

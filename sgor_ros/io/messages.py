@@ -20,8 +20,9 @@ from .pointcloud2 import encode
 
 Types = Callable[[str], Any]
 
-# REP 145 and sensor_msgs: a first element of -1 says that the covariance is not known
-UNKNOWN_COVARIANCE = -1.0
+# m^2, rad^2 and their rates: what is not known gets variances that leave it no weight. The -1 of
+# sensor_msgs is no covariance, and robot_localization makes an exact measurement of it.
+UNKNOWN_VARIANCE = 1e6
 
 # what a person can tell apart in RViz, and what Python can send at 10 Hz
 MAX_INLIER_LINES = 1000
@@ -86,8 +87,8 @@ def pose_stamped(types: Types, tracked: TrackedScan, odom_frame: str) -> Any:
 def odometry(types: Types, tracked: TrackedScan, odom_frame: str, sensor_frame: str) -> Any:
     """Return a nav_msgs/msg/Odometry of a scan that has a pose.
 
-    The twist is in the sensor frame. What is not known has -1 in the first element of its
-    covariance: the pose where a step gave no covariance, and the twist always.
+    The twist is in the sensor frame. What is not known has `UNKNOWN_VARIANCE` on the diagonal of
+    its covariance: the pose where a step gave no covariance, and the twist always.
     """
     return odometry_of(types, _pose_of(tracked), tracked.stamp_ns, odom_frame, sensor_frame,
                        tracked.covariance, tracked.twist)
@@ -174,9 +175,7 @@ def _covariance(covariance: NDArray[np.float64] | None) -> NDArray[np.float64]:
     """Return the 36 numbers of a ROS covariance, row by row."""
     if covariance is not None:
         return np.ascontiguousarray(covariance, np.float64).reshape(36)
-    unknown = np.zeros(36)
-    unknown[0] = UNKNOWN_COVARIANCE
-    return unknown
+    return np.diag(np.full(6, UNKNOWN_VARIANCE)).reshape(36)
 
 
 def _byte_array(message: Any, data: NDArray[np.uint8]) -> Any:
