@@ -170,11 +170,15 @@ def test_time_that_runs_backwards_starts_anew(street, tmp_path, capsys):
 
 def test_missing_label_field_tells_the_fields(street, tmp_path, capsys):
     bag = write_bag(tmp_path / 'bag', [(street[0][0], None, 0), (street[1][0], None, PERIOD_NS)])
-    assert main([str(bag), '--output', str(tmp_path)]) == 2
+    assert main([str(bag), '--output', str(tmp_path), '--label-field', 'label']) == 2
     assert 'none of 2 clouds could be used: field label: the cloud has none; its fields are ' \
         'x, y, z' in capsys.readouterr().err
-    assert main([str(bag), '--output', str(tmp_path), '--label-field', '']) == 0
-    assert summary(tmp_path)['successes'] == 2
+    assert main([str(bag), '--output', str(tmp_path), '--label-field', 'x']) == 2
+    assert 'field x: it holds coordinates' in capsys.readouterr().err
+    for field, told in (('auto', 1), ('none', 0)):
+        assert main([str(bag), '--output', str(tmp_path), '--label-field', field]) == 0
+        assert summary(tmp_path)['successes'] == 2
+        assert capsys.readouterr().err.count('works without labels') == told
 
 
 @pytest.fixture

@@ -27,6 +27,8 @@ from ..io.bags import BagReader
 from ..io.bags import BagWriter
 from ..io.bags import RecordedCloud
 from ..io.environment import describe_environment
+from ..io.label_field import choice_in_words
+from ..io.label_field import label_field_of
 from ..io.pointcloud2 import decode
 from ..io.stream_config import StreamConfig
 from ..io.trajectories import write_kitti
@@ -123,6 +125,13 @@ class Warnings:
 
     def __init__(self) -> None:
         self.texts: list[str] = []
+        self._noted: set[str] = set()
+
+    def note(self, text: str) -> None:
+        """Tell `text`, if it is new: it is no warning."""
+        if text and text not in self._noted:
+            self._noted.add(text)
+            tqdm.write(text, file=sys.stderr)
 
     def add(self, text: str) -> None:
         """Tell `text`, if it is new."""
@@ -142,7 +151,9 @@ def _step(tracker: Tracker, cloud: RecordedCloud, stream: StreamConfig, writer: 
     start = time.perf_counter()
     try:
         stamp_ns, frame_id, message = cloud.read()
-        tracked = tracker.track(decode(message, stream.label_field), stamp_ns)
+        warnings.note(choice_in_words(message, stream.label_field))
+        scan = decode(message, label_field_of(message, stream.label_field))
+        tracked = tracker.track(scan, stamp_ns)
     except InputError as error:
         warnings.add(f'scan at {stamp_ns * 1e-9:.3f} s left out: {error}')
         return Row(stamp_ns, str(error))

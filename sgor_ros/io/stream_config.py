@@ -4,6 +4,8 @@ from dataclasses import dataclass
 from ..core.common.settings import InputError
 from ..core.common.settings import setting
 from ..core.common.settings import Settings
+from .label_field import AUTO
+from .label_field import LABEL_FIELDS
 
 
 @dataclass(frozen=True)
@@ -11,7 +13,8 @@ class StreamConfig(Settings):
     """Field of the labels and names of the frames."""
 
     label_field: str = setting(
-        'label', 'Field of the clouds that holds the class ids; empty: work without labels')
+        AUTO, 'Field of the clouds that holds the class ids; auto: the first of '
+        f'{", ".join(LABEL_FIELDS)} that a cloud has; none: work without labels')
     odom_frame: str = setting(
         'odom', 'Frame of the published poses; its origin is the first scan')
     sensor_frame: str = setting(

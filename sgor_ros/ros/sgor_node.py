@@ -13,6 +13,8 @@ from visualization_msgs.msg import MarkerArray
 from ..core.common.settings import InputError
 from ..core.warmup import warm_up
 from ..io import messages
+from ..io.label_field import choice_in_words
+from ..io.label_field import label_field_of
 from ..io.pointcloud2 import decode
 from ..tracker import TrackedScan
 from ..tracker import Tracker
@@ -114,8 +116,10 @@ class SgorNode(Node):
         if self._reset_wanted.is_set():
             self._reset_wanted.clear()
             self._tracker.reset()
+        self._log.note(choice_in_words(cloud, self._config.label_field))
         try:
-            tracked = self._tracker.track(decode(cloud, self._config.label_field), stamp_ns)
+            scan = decode(cloud, label_field_of(cloud, self._config.label_field))
+            tracked = self._tracker.track(scan, stamp_ns)
         except InputError as error:
             self._failed += 1
             level, message, values = status.ERROR, f'unusable cloud: {error}', {}
@@ -123,8 +127,8 @@ class SgorNode(Node):
             self._publish(tracked, frame)
             level, message = status.judged(tracked)
             values = status.details(tracked)
-        if level == status.ERROR:
-            self._log.seldom(f'scan at {stamp_ns * 1e-9:.3f} s: {message}')
+        self._log.trouble('' if level == status.OK else message,
+                          f'scan at {stamp_ns * 1e-9:.3f} s')
         now = time.monotonic()
         values |= {'seconds': f'{now - begin:.4f}', 'latency': f'{now - received:.4f}'}
         self._diagnostics.publish(status.diagnostics(
@@ -144,5 +148,3 @@ class SgorNode(Node):
             self._failed += 1
         if self._markers.get_subscription_count():
             self._markers.publish(messages.correspondence_markers(ros_type, tracked, odom))
-        for text in tracked.warnings:
-            self._log.once(text)

@@ -40,7 +40,7 @@ def diagnostics(name: str, frame: str, stamp_ns: int, level: bytes, message: str
 def judged(tracked: TrackedScan) -> tuple[bytes, str]:
     """Return the level of a scan and why."""
     if not tracked.success:
-        return ERROR, f'registration failed: {tracked.reason}'
+        return ERROR, '; '.join((f'registration failed: {tracked.reason}', *tracked.warnings))
     if tracked.warnings:
         return WARN, '; '.join(tracked.warnings)
     return OK, 'first scan of a track' if tracked.restarted else 'registered'
