@@ -76,5 +76,10 @@ say "making $venv (one to three minutes)"
 "$python" -m venv --clear "${options[@]}" "$venv"
 "$venv/bin/python" -m pip install -qq --disable-pip-version-check --editable ".[$extras]" \
     "${pins[@]}"
+if [ "${#pins[@]}" -eq 0 ]; then
+    say 'building tf2_msgs for the tests of /tf (a minute)'
+    bash scripts/tf2_msgs.sh "$venv/bin/python" "$venv/tf2_msgs" ||
+        say 'it could not be built (cmake and a C++ compiler?): the tests of /tf are skipped'
+fi
 "$venv/bin/python" -c 'import open3d, rclpy, sgor_ros, small_gicp'
 say "ready: $venv/bin/python"

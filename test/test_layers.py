@@ -12,7 +12,7 @@ PACKAGE = Path(sgor_ros.__file__).parent
 SHELLS = {'io', 'ros', 'commands', 'evaluation'}
 ROS = {'rclpy', 'ament_index_python', 'launch', 'launch_ros', 'sensor_msgs', 'nav_msgs',
        'geometry_msgs', 'visualization_msgs', 'diagnostic_msgs', 'std_msgs', 'std_srvs',
-       'builtin_interfaces', 'rcl_interfaces', 'tf2_msgs'}
+       'builtin_interfaces', 'rcl_interfaces', 'tf2_msgs', 'tf2_ros'}
 FILES = {'rosbags', 'matplotlib', 'tqdm', 'argparse'}
 
 # module or folder -> what it may import of the package besides itself

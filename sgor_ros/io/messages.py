@@ -73,9 +73,27 @@ def pose(types: Types, T: NDArray[np.float64]) -> Any:
 
 def matrix_of(pose: Any) -> NDArray[np.float64]:
     """Return the (4, 4) transformation of a geometry_msgs/msg/Pose."""
-    x, q = pose.position, pose.orientation
+    return _matrix(pose.position, pose.orientation)
+
+
+def matrix_of_transform(transform: Any) -> NDArray[np.float64]:
+    """Return the (4, 4) transformation of a geometry_msgs/msg/Transform."""
+    return _matrix(transform.translation, transform.rotation)
+
+
+def _matrix(x: Any, q: Any) -> NDArray[np.float64]:
     return se3.compose(Rotation.from_quat([q.x, q.y, q.z, q.w]).as_matrix(),
                        np.array([x.x, x.y, x.z]))
+
+
+def transform_stamped(types: Types, T: NDArray[np.float64], stamp_ns: int, frame: str,
+                      child_frame: str) -> Any:
+    """Return a geometry_msgs/msg/TransformStamped of a (4, 4) pose of the child in the frame."""
+    vector = types('geometry_msgs/msg/Vector3')
+    return types('geometry_msgs/msg/TransformStamped')(
+        header=header(types, stamp_ns, frame), child_frame_id=child_frame,
+        transform=types('geometry_msgs/msg/Transform')(
+            translation=_point(vector, T[:3, 3]), rotation=pose(types, T).orientation))
 
 
 def pose_stamped(types: Types, tracked: TrackedScan, odom_frame: str) -> Any:
@@ -92,6 +110,22 @@ def odometry(types: Types, tracked: TrackedScan, odom_frame: str, sensor_frame: 
     """
     return odometry_of(types, _pose_of(tracked), tracked.stamp_ns, odom_frame, sensor_frame,
                        tracked.covariance, tracked.twist)
+
+
+def relative_pose(types: Types, tracked: TrackedScan, sensor_frame: str) -> Any:
+    """Return a nav_msgs/msg/Odometry of the step from a scan to its reference: a graph's edge.
+
+    Both frames carry the stamps of their scans: ``lidar@100200000000`` is where `sensor_frame`
+    was then. The pose of the scan (child) in the reference is T_target_source, its covariance
+    that of the registration alone.
+    """
+    step, reference_ns = tracked.registration, tracked.reference_stamp_ns
+    assert step is not None, 'only scans with a step are relative to something'
+    assert step.T_target_source is not None
+    assert reference_ns is not None
+    return odometry_of(types, step.T_target_source, tracked.stamp_ns,
+                       f'{sensor_frame}@{reference_ns}', f'{sensor_frame}@{tracked.stamp_ns}',
+                       step.covariance)
 
 
 def odometry_of(types: Types, T: NDArray[np.float64], stamp_ns: int, frame: str,

@@ -3,28 +3,24 @@ import threading
 import time
 
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import PoseStamped
-from nav_msgs.msg import Odometry
 from rclpy.node import Node
 from sensor_msgs.msg import PointCloud2
 from std_srvs.srv import Trigger
-from visualization_msgs.msg import MarkerArray
 
 from ..core.common.settings import InputError
 from ..core.warmup import warm_up
 from ..io import messages
+from ..io.frames import frame_id
 from ..io.label_field import choice_in_words
 from ..io.label_field import label_field_of
 from ..io.pointcloud2 import decode
-from ..tracker import TrackedScan
 from ..tracker import Tracker
 from . import status
 from .clouds import Clouds
 from .log import SparingLog
+from .outputs import Outputs
 from .parameters import NodeParameters
 from .slot import NewestSlot
-from .tf import TransformPublisher
-from .types import ros_type
 
 # before this, loading is nothing to talk about
 COMPILING_S = 1.0
@@ -40,11 +36,8 @@ class SgorNode(Node):
         self._settings = NodeParameters(self)
         self._config = self._settings.node_config
         self._tracker = Tracker(*self._settings.live)
-        self._pose = self.create_publisher(PoseStamped, 'pose', 10)
-        self._odometry = self.create_publisher(Odometry, 'odometry', 10)
-        self._markers = self.create_publisher(MarkerArray, 'correspondences', 1)
+        self._outputs = Outputs(self, self._config)
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
-        self._tf = TransformPublisher(self) if self._config.publish_tf else None
         self.create_service(Trigger, 'reset', self._on_reset)
         self._reset_wanted = threading.Event()
         self._slot: NewestSlot[tuple[PointCloud2, float]] = NewestSlot()
@@ -109,7 +102,7 @@ class SgorNode(Node):
     def _process(self, cloud: PointCloud2, received: float) -> None:
         begin = time.monotonic()
         stamp_ns = messages.stamp_ns_of(cloud.header)
-        frame = self._config.sensor_frame or cloud.header.frame_id
+        frame = self._config.sensor_frame or frame_id(cloud.header.frame_id)
         if not frame:
             self._log.once('the clouds have no frame_id: set the parameter sensor_frame')
         self._tracker.config, self._tracker.tracker_config = self._settings.live
@@ -124,8 +117,10 @@ class SgorNode(Node):
             self._failed += 1
             level, message, values = status.ERROR, f'unusable cloud: {error}', {}
         else:
-            self._publish(tracked, frame)
-            level, message = status.judged(tracked)
+            self._processed += tracked.success
+            self._failed += not tracked.success
+            unplaced = self._outputs.publish(tracked, frame)
+            level, message = status.judged(tracked, unplaced)
             values = status.details(tracked)
         self._log.trouble('' if level == status.OK else message,
                           f'scan at {stamp_ns * 1e-9:.3f} s')
@@ -134,17 +129,3 @@ class SgorNode(Node):
         self._diagnostics.publish(status.diagnostics(
             self.get_fully_qualified_name(), frame, stamp_ns, level, message, self.counts(),
             values))
-
-    def _publish(self, tracked: TrackedScan, frame: str) -> None:
-        """Send the pose, if there is one, then what only a display needs."""
-        odom = self._config.odom_frame
-        if tracked.success:
-            self._processed += 1
-            self._odometry.publish(messages.odometry(ros_type, tracked, odom, frame))
-            self._pose.publish(messages.pose_stamped(ros_type, tracked, odom))
-            if self._tf:
-                self._tf.publish(tracked, odom, frame)
-        else:
-            self._failed += 1
-        if self._markers.get_subscription_count():
-            self._markers.publish(messages.correspondence_markers(ros_type, tracked, odom))

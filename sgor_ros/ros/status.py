@@ -37,10 +37,19 @@ def diagnostics(name: str, frame: str, stamp_ns: int, level: bytes, message: str
             values=[KeyValue(key=key, value=value) for key, value in pairs.items()])])
 
 
-def judged(tracked: TrackedScan) -> tuple[bytes, str]:
-    """Return the level of a scan and why."""
+def judged(tracked: TrackedScan, unplaced: str) -> tuple[bytes, str]:
+    """Return the level of a scan and why.
+
+    Parameters
+    ----------
+    tracked : TrackedScan
+    unplaced : str
+        Why its pose could not be published; empty where nothing was in the way.
+    """
     if not tracked.success:
         return ERROR, '; '.join((f'registration failed: {tracked.reason}', *tracked.warnings))
+    if unplaced:
+        return WARN, '; '.join((f'nothing is published: {unplaced}', *tracked.warnings))
     if tracked.warnings:
         return WARN, '; '.join(tracked.warnings)
     return OK, 'first scan of a track' if tracked.restarted else 'registered'
