@@ -96,6 +96,30 @@ def test_a_mount_that_turns_leaves_the_base_where_it_is():
                                    atol=1e-12)
 
 
+@pytest.mark.parametrize('mount', [None, pose(*map(float, MOUNT.split()))])
+def test_doubt_about_the_start_goes_with_the_track(mount):
+    """A track that begins at a given pose; the one after it begins at the origin."""
+    rng = np.random.default_rng(1)
+    root = rng.normal(size=(6, 6))
+    start, doubt, T = pose(9, 8, 7, 0.3, 0.2, 1), root @ root.T, pose(10, 4, 1, 0.1, -0.2, 2)
+
+    def at(T_start):
+        placement = Placement()
+        placement.begin_at(T_start, doubt)
+        first = placement.place(tracked(np.eye(4), True, covariance=np.zeros((6, 6))), mount)
+        np.testing.assert_allclose(first.T_odom_sensor, T_start, atol=1e-12)
+        np.testing.assert_allclose(first.covariance, doubt)
+        return placement, placement.place(tracked(T, covariance=np.zeros((6, 6))), mount)
+
+    placement, mean = at(start)
+    J = jacobian(lambda xi: difference(at(perturbed(start, xi))[1].T_odom_sensor,
+                                       mean.T_odom_sensor))
+    np.testing.assert_allclose(mean.covariance, J @ doubt @ J.T, rtol=1e-5, atol=1e-6)
+    again = placement.place(tracked(np.eye(4), True, covariance=np.zeros((6, 6))), mount)
+    np.testing.assert_allclose(again.T_odom_sensor, np.eye(4), atol=1e-12)
+    np.testing.assert_array_equal(again.covariance, np.zeros((6, 6)))
+
+
 def test_without_a_base_or_a_pose_nothing_changes():
     placement = Placement()
     scan = tracked(pose(1, 2, 3, 0, 0, 1), restarted=True, covariance=np.eye(6))

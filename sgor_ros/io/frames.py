@@ -63,11 +63,19 @@ def of_base(tracked: TrackedScan, T_base_sensor: Array) -> TrackedScan:
 class Placement:
     """Where the poses of a track are published: the node's and the replay's way is one.
 
-    The frame that is published, base or sensor, begins a track at the origin of the odom frame.
+    The frame that is published, base or sensor, begins a track at the origin of the odom frame,
+    or where `begin_at` says.
     """
 
     def __init__(self) -> None:
-        self._T_odom_start: Array | None = None
+        self._T_odom_start: Array | None = None    # the first pose of the sensor
+        self._T_odom_child: Array | None = None    # and of what is published, where it was given
+        self._covariance = np.zeros((6, 6))
+        self._next: tuple[Array, Array] | None = None
+
+    def begin_at(self, T_odom_child: Array, covariance: Array) -> None:
+        """Let the next track begin at a pose of the frame that is published."""
+        self._next = T_odom_child, covariance
 
     def place(self, tracked: TrackedScan, T_base_sensor: Array | None) -> TrackedScan:
         """Return a scan of the track with pose, covariance and twist of the base.
@@ -79,16 +87,30 @@ class Placement:
             At the stamp of the scan; None where the sensor itself is wanted.
         """
         if tracked.restarted:
-            self._T_odom_start = None
-        if T_base_sensor is None:
+            self._T_odom_start = self._T_odom_child = None
+            if self._next is not None:
+                self._T_odom_child, self._covariance = self._next
+                self._next = None
+        if T_base_sensor is None and self._T_odom_child is None:
             return tracked
+        if T_base_sensor is None:
+            T_base_sensor = np.eye(4)
         if self._T_odom_start is None:
-            self._T_odom_start = T_base_sensor
-        return of_base(in_odom(tracked, self._T_odom_start), T_base_sensor)
+            begin = np.eye(4) if self._T_odom_child is None else self._T_odom_child
+            self._T_odom_start = begin @ T_base_sensor
+        return self._doubted(of_base(in_odom(tracked, self._T_odom_start), T_base_sensor))
 
     def of_sensor(self, tracked: TrackedScan) -> TrackedScan:
         """Return a scan with the pose of its sensor in the same odom frame."""
         return tracked if self._T_odom_start is None else in_odom(tracked, self._T_odom_start)
+
+    def _doubted(self, placed: TrackedScan) -> TrackedScan:
+        """Add the doubt about the pose that the track began at."""
+        if self._T_odom_child is None or placed.T_odom_sensor is None or placed.covariance is None:
+            return placed
+        lever = _moved_by(placed.T_odom_sensor[:3, 3] - self._T_odom_child[:3, 3])
+        return replace(placed, covariance=placed.covariance
+                       + lever @ self._covariance @ lever.T)
 
 
 def _moved_by(lever: Array) -> Array:

@@ -2,8 +2,6 @@
 from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import Odometry
 from rclpy.node import Node
-from rclpy.publisher import Publisher
-from rclpy.qos_overriding_options import QoSOverridingOptions
 from visualization_msgs.msg import MarkerArray
 
 from ..io import messages
@@ -12,6 +10,7 @@ from ..io.frames import Placement
 from ..tracker import TrackedScan
 from . import base
 from .parameters import NodeConfig
+from .publishers import publisher
 from .tf import TransformPublisher
 from .types import ros_type
 
@@ -25,17 +24,17 @@ class Outputs:
     def __init__(self, node: Node, config: NodeConfig) -> None:
         self._odom = config.odom_frame
         self._base = config.base_frame
-        self._pose = _publisher(node, PoseStamped, 'pose', 10)
-        self._odometry = _publisher(node, Odometry, 'odometry', 10)
-        self._relative = _publisher(node, Odometry, 'relative_pose', RELATIVE_DEPTH)
-        self._markers = _publisher(node, MarkerArray, 'correspondences', 1)
+        self._pose = publisher(node, PoseStamped, 'pose', 10)
+        self._odometry = publisher(node, Odometry, 'odometry', 10)
+        self._relative = publisher(node, Odometry, 'relative_pose', RELATIVE_DEPTH)
+        self._markers = publisher(node, MarkerArray, 'correspondences', 1)
         self._tf = TransformPublisher(node, config.invert_tf) if config.publish_tf else None
         self._extrinsic: base.Extrinsic | None = None
         if config.T_base_sensor:
             self._extrinsic = base.fixed(parse_transform(config.T_base_sensor, 'T_base_sensor'))
         elif config.base_frame:
             self._extrinsic = base.by_tf2(node, config.base_frame)
-        self._placement = Placement()
+        self.placement = Placement()
 
     def publish(self, tracked: TrackedScan, sensor_frame: str) -> str:
         """Send what there is of a scan; return why it has no pose although it was registered."""
@@ -46,7 +45,7 @@ class Outputs:
             trouble = self._publish_pose(tracked, sensor_frame)
         if not trouble and self._markers.get_subscription_count():
             self._markers.publish(messages.correspondence_markers(
-                ros_type, self._placement.of_sensor(tracked), self._odom))
+                ros_type, self.placement.of_sensor(tracked), self._odom))
         return trouble
 
     def _publish_pose(self, tracked: TrackedScan, sensor_frame: str) -> str:
@@ -54,15 +53,10 @@ class Outputs:
         T_base_sensor = self._extrinsic and self._extrinsic(tracked.stamp_ns, sensor_frame)
         if isinstance(T_base_sensor, str):
             return T_base_sensor
-        placed = self._placement.place(tracked, T_base_sensor)
+        placed = self.placement.place(tracked, T_base_sensor)
         frame = self._base or sensor_frame
         self._odometry.publish(messages.odometry(ros_type, placed, self._odom, frame))
         self._pose.publish(messages.pose_stamped(ros_type, placed, self._odom))
         if self._tf:
             self._tf.publish(placed, self._odom, frame)
         return ''
-
-
-def _publisher(node: Node, kind: type, topic: str, depth: int) -> Publisher:
-    return node.create_publisher(
-        kind, topic, depth, qos_overriding_options=QoSOverridingOptions.with_default_policies())

@@ -10,20 +10,27 @@ from ..tracker import TrackedScan
 from .types import ros_type
 
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
+STALE = DiagnosticStatus.STALE
 
 
 @dataclass
 class Counts:
-    """Scans since the start: received = processed + failed + replaced + the one at work."""
+    """Scans since the start: received = processed + failed + replaced + the one at work.
+
+    Before those, `missed` never came, by their stamps, and `paused` came while the node paused.
+    """
 
     received: int = 0
     processed: int = 0
     replaced: int = 0
     failed: int = 0
+    missed: int = 0
+    paused: int = 0
 
     def __str__(self) -> str:
-        """Return the counts in one line."""
-        return ', '.join(f'{name} {count}' for name, count in vars(self).items())
+        """Return the counts in one line, without what never happened before the count."""
+        return ', '.join(f'{name} {count}' for name, count in vars(self).items()
+                         if count or name not in ('missed', 'paused'))
 
 
 def diagnostics(name: str, frame: str, stamp_ns: int, level: bytes, message: str, counts: Counts,

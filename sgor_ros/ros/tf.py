@@ -1,12 +1,12 @@
 """The transform of the odometry on /tf, for those who want it."""
 from rclpy.node import Node
 from rclpy.publisher import Publisher
-from rclpy.qos import QoSProfile
 
 from ..core.common import se3
 from ..core.common.settings import InputError
 from ..io import messages
 from ..tracker import TrackedScan
+from .publishers import publisher
 from .types import ros_type
 
 
@@ -27,8 +27,7 @@ class TransformPublisher:
             raise InputError('publish_tf = True: the package tf2_msgs is not installed; '
                              'apt install ros-jazzy-tf2-msgs') from error
         self._inverted = inverted
-        self._publisher: Publisher = node.create_publisher(
-            self._message, '/tf', QoSProfile(depth=100))
+        self._publisher: Publisher = publisher(node, self._message, '/tf', 100)
 
     def publish(self, tracked: TrackedScan, odom_frame: str, frame: str) -> None:
         """Send the pose of a scan as the transform between `odom_frame` and `frame`."""
