@@ -182,7 +182,8 @@ def slowness(answered: int, sent: int, seconds: Array, rate: float) -> str:
     median = float(np.nanmedian(seconds))
     return (f'This machine is too slow, or too busy, for {rate:g} scans a second: a scan takes '
             f'{1e3 * median:.0f} ms.\nThe node took the newest one each time, {answered} of '
-            f'{sent}; the errors above are of those.\n--rate {LOAD / median:.2g} would leave none out.')
+            f'{sent}; the errors above are of those.\n--rate {LOAD / median:.2g} would leave '
+            'none out.')
 
 
 def report(sent: int, counts: dict[str, str], seconds: Array, latency: Array,
