@@ -54,6 +54,18 @@ def test_demo_lists_the_places_that_there_are(tmp_path):
         write_world_bag(tmp_path / 'bag', 3, 0, 'moon')
 
 
+def test_demo_on_a_machine_that_is_too_slow(tmp_path):
+    """As any is for this rate: it says so, shows what it could do, and that is no failure."""
+    done = run_demo('--scans', 20, '--rate', 100, '--out', tmp_path / 'demo')
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert 'too slow, or too busy, for 100 scans a second' in done.stdout
+    answered = int(re.search(r'each time, (\d+) of 20', done.stdout).group(1))
+    assert 2 <= answered < 18
+    assert 0.1 < float(re.search(r'--rate ([\d.]+) would', done.stdout).group(1)) < 100
+    assert re.search(r'TE of consecutive pairs +median', done.stdout)
+    assert (tmp_path / 'demo/trajectory.png').is_file()
+
+
 def test_long_drives_go_forth_and_back_with_stamps_that_go_on():
     played = list(forth_and_back([10, 13, 16], 7))
     assert played == [(10, 10), (13, 13), (16, 16), (13, 19), (10, 22), (13, 25), (16, 28)]

@@ -31,6 +31,9 @@ from .scan import SemanticScan
 from .voxels import voxel_grid
 from .voxels import VoxelCloud
 
+# ids to name in a warning
+UNKNOWN_TOLD = 5
+
 
 def preprocess(scan: SemanticScan, config: SgorConfig | None = None, *,
                keypoints: ArrayLike | None = None,
@@ -112,9 +115,20 @@ def _usable(scan: SemanticScan, convention: LabelConvention, config: SgorConfig
     keep &= fixed
     warnings = []
     if unknown:
-        warnings.append(f'label ids {unknown} are not in convention {convention.name}: '
-                        'treated as unlabelled')
+        warnings.append(_unknown_in_words(scan.labels & convention.mask, unknown, convention.name))
     return np.compress(keep, scan.points, axis=0), labels[keep], warnings
+
+
+def _unknown_in_words(ids: NDArray[np.int64], unknown: list[int], convention: str) -> str:
+    """Return a warning about ids that a convention does not list; a wrong field has thousands."""
+    told = ', '.join(str(i) for i in unknown[:UNKNOWN_TOLD])
+    if len(unknown) > UNKNOWN_TOLD:
+        told += f', ... {len(unknown)} in all'
+    share = float(np.isin(ids, unknown).mean())
+    text = f'label ids [{told}] are not in convention {convention}: treated as unlabelled'
+    if share <= 0.5:
+        return text
+    return f'{text}; these are {share:.0%} of the points: is label_convention right?'
 
 
 def _unmatched_classes(convention: LabelConvention, config: SgorConfig) -> list[int]:
