@@ -24,7 +24,8 @@ class TrackerConfig(Settings):
         0.4, 'Below this share of the inliers that the first scan after the keyframe had, the '
         'scan becomes the next', minimum=0.0, maximum=1.0)
     max_keyframes: int = setting(
-        10, 'Keyframes to remember; where there are more, the one nearest to another goes',
+        10, 'Keyframes to remember; where there are more, the one goes that leaves the '
+        'smallest gap',
         minimum=3, maximum=1000)
     min_keypoints: int = setting(
         100, 'A scan with fewer keypoints becomes no keyframe', minimum=3, maximum=10000)

@@ -61,13 +61,18 @@ class Keyframes:
         return len(self._kept)
 
     def add(self, keyframe: Keyframe, limit: int) -> None:
-        """Remember one more; beyond the limit forget what another keyframe stands in for."""
+        """Remember one more; beyond the limit forget the one that leaves the smallest gap."""
         self._kept.append(keyframe)
         while len(self._kept) > limit:
-            old = self._kept[:-NEWEST]
-            spare = min(old, key=lambda one: min(
-                one.distance(other) for other in self._kept if other is not one))
-            self._kept.remove(spare)
+            self._kept.remove(min(self._kept[:-NEWEST], key=self._gap))
+
+    def _gap(self, keyframe: Keyframe) -> float:
+        """Return the metres between its neighbours in time, by way of it; infinite at an end."""
+        place = self._kept.index(keyframe)
+        if place == 0:
+            return float('inf')
+        return (keyframe.distance(self._kept[place - 1])
+                + keyframe.distance(self._kept[place + 1]))
 
     def keep(self, keyframe: Keyframe, limit: int) -> None:
         """Remember a keyframe, if it is not remembered yet."""
