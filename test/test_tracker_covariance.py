@@ -7,15 +7,14 @@ from sgor_ros import SemanticScan
 from sgor_ros import Tracker
 from sgor_ros import TrackerConfig
 from sgor_ros.core.common import se3
+from sgor_ros.evaluation.nees import BOUND
+from sgor_ros.evaluation.nees import nees
+from sgor_ros.evaluation.nees import track_nees
 from sgor_ros.tracker.covariance import CORRELATION_LENGTHS_M
 from sgor_ros.tracker.covariance import PoseCovariance
 from sgor_ros.tracker.covariance import square_root
 from sgor_ros.world import Lidar
 from sgor_ros.world import simulate
-
-PERIOD_NS = 100_000_000
-BOUND = 20.06
-"""Squared distance in six dimensions that 99.7 % of honest errors stay below."""
 
 
 def step(x, y, z, *turn):
@@ -81,11 +80,6 @@ def test_what_errs_alike_adds_up():
     assert np.sqrt(apart.pose[0, 0]) == pytest.approx(0.01 * np.sqrt(10))
 
 
-def squared_distance(T, truth, covariance):
-    error = se3.perturbation(T, truth)
-    return error @ np.linalg.solve(covariance, error)
-
-
 @pytest.mark.parametrize('speed', [1.5, 8.0])
 @pytest.mark.parametrize('mode', ['consecutive', 'keyframe'])
 def test_errors_are_as_large_as_is_claimed(mode, speed):
@@ -95,25 +89,32 @@ def test_errors_are_as_large_as_is_claimed(mode, speed):
     what repeats is no larger everywhere than it can be, but none may be beyond the bound.
     """
     tracker = Tracker(tracker_config=TrackerConfig(mode=mode))
-    truth, relative, absolute, twist = {}, [], [], []
+    tracked, truth, twist = [], [], []
     lidar = Lidar(beams=64, columns=900)
     for stamp, points, labels, T in simulate(25, seed=21, lidar=lidar, speed=speed):
-        stamp_ns = round(stamp * 1e9)
-        result = tracker.track(SemanticScan(points, labels), stamp_ns)
-        truth[stamp_ns] = T
+        result = tracker.track(SemanticScan(points, labels), round(stamp * 1e9))
         assert result.success
-        if stamp_ns == 0:
-            continue
-        np.linalg.cholesky(result.reference_covariance)
-        np.linalg.cholesky(result.covariance)
-        relative.append(squared_distance(
-            result.T_reference_sensor,
-            se3.inverse(truth[result.reference_stamp_ns]) @ T, result.reference_covariance))
-        absolute.append(squared_distance(result.T_odom_sensor, se3.inverse(truth[0]) @ T,
-                                         result.covariance))
-        velocity = se3.log(se3.inverse(truth[stamp_ns - PERIOD_NS]) @ T) * 10
-        off = result.twist - velocity
-        twist.append(off @ np.linalg.solve(result.twist_covariance, off))
+        tracked.append(result)
+        truth.append(T)
+        if len(truth) > 1:
+            np.linalg.cholesky(result.reference_covariance)
+            np.linalg.cholesky(result.covariance)
+            off = result.twist - se3.log(se3.inverse(truth[-2]) @ T) / 0.1
+            twist.append(off @ np.linalg.solve(result.twist_covariance, off))
+    relative, absolute = track_nees(tracked, np.array(truth))
+    assert len(relative) == len(absolute) == 24
     for distances in (relative, absolute, twist):
         assert max(distances) < BOUND
         assert 0.2 < np.mean(distances) < 10
+
+
+def test_nees_of_right_covariances_is_six():
+    """Errors drawn from the covariance that is claimed; twice the error is four times that."""
+    rng = np.random.default_rng(1)
+    covariance = next(covariances(rng))
+    for factor, expected in ((1.0, 6.0), (2.0, 24.0)):
+        noise = factor * rng.multivariate_normal(np.zeros(6), covariance, 2000)
+        found = [nees(T, STEPS[0], covariance) for T in perturbed(STEPS[0], noise)]
+        assert np.mean(found) == pytest.approx(expected, rel=0.06)
+        if factor == 1.0:
+            assert np.mean(np.array(found) < BOUND) == pytest.approx(0.997, abs=0.003)
