@@ -1,4 +1,6 @@
 """What the motion so far makes of registrations that cannot stand alone: made by hand."""
+from conftest import errors
+from conftest import relative
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -6,13 +8,15 @@ from scipy.spatial.transform import Rotation
 from sgor_ros import preprocess
 from sgor_ros import Registration
 from sgor_ros import SemanticScan
+from sgor_ros import SgorConfig
 from sgor_ros import State
 from sgor_ros import Tracker
 from sgor_ros import TrackerConfig
 from sgor_ros.core.common import se3
 from sgor_ros.core.result import Placement
 from sgor_ros.tracker import tracker as tracker_module
-from sgor_ros.tracker.choice import choose
+from sgor_ros.tracker.choice import choose as choose_refined
+from sgor_ros.tracker.choice import refined
 from sgor_ros.tracker.choice import Step
 from sgor_ros.tracker.motion import Motion
 
@@ -34,6 +38,11 @@ def registration(T, *others, success=False, degenerate=None, covariance=COVARIAN
         success, '' if success else 'not alone', T, np.zeros((20, 3)), np.zeros((20, 3)),
         np.ones(20, np.bool_), 1.0, covariance, degenerate=free,
         alternatives=tuple(Placement(other, covariance, free, {}) for other in others))
+
+
+def choose(*given):
+    """Choose among placements that need no refinement."""
+    return choose_refined(*given, refine=lambda placement: placement)
 
 
 @pytest.fixture
@@ -104,6 +113,30 @@ def test_a_free_direction_is_predicted_and_the_others_are_measured(driving, cova
     assert sigma[0] > 0.05, 'nobody measured it'
     assert (sigma[1:3] < 0.006).all()
     assert step.note == 'degenerate: predicted along (1.00, 0.00, 0.00)'
+
+
+def test_a_loose_covariance_is_predicted_too_where_no_direction_is_named(driving):
+    loose = COVARIANCE + 25.0 * np.outer(ALONG_X, ALONG_X)
+    step = choose(registration(pose(0.0, 0.05), pose(0.0, 9.0), covariance=loose), *driving,
+                  CONFIG)
+    np.testing.assert_allclose(step.T_reference_sensor, pose(3.2, 0.05), atol=0.01)
+    assert step.fused is not None
+
+
+def test_an_alternative_is_refined_before_it_is_believed(street):
+    """0.3 m off, as the search for rivals leaves it, with a covariance of the best one."""
+    target, source = (preprocess(SemanticScan(points, labels))
+                      for points, labels, _ in street[:2])
+    truth = relative(street[0][2], street[1][2])
+    rough = truth @ pose(0.3, 0.1, 0.0, 0.01)
+    motion = Motion.unknown(0, np.eye(4), np.zeros((6, 6)), CONFIG)
+    step = choose_refined(
+        registration(pose(40.0), rough), motion, PERIOD_NS, CONFIG,
+        lambda placement: refined(placement, source, target, SgorConfig()))
+    assert errors(step.T_reference_sensor, truth)[0] < 0.03
+    assert np.trace(step.covariance) < 1e-3
+    assert refined(Placement(rough, None, np.empty((0, 6)), {}), source, target, SgorConfig()
+                   ).covariance is not None
 
 
 def test_a_degenerate_result_that_contradicts_the_motion_is_no_pose(driving):

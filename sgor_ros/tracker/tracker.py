@@ -13,6 +13,7 @@ from ..core.scan.preprocessing import preprocess
 from ..core.scan.scan import PreparedScan
 from ..core.scan.scan import SemanticScan
 from .choice import choose
+from .choice import refined
 from .choice import Step
 from .choice import UNKNOWN_COVARIANCE
 from .config import TrackerConfig
@@ -134,7 +135,8 @@ class Tracker:
         if keyframe.stamp_ns == self._reference.stamp_ns:
             self._reference = keyframe
             step = choose(found, self._motion_before(new.stamp_ns), new.stamp_ns,
-                          self.tracker_config)
+                          self.tracker_config, lambda placement: refined(
+                              placement, new.prepared, keyframe.prepared, self.config))
         elif found.success and found.T_target_source is not None:
             step = self._distant_step(found, keyframe, new.stamp_ns)
         else:
