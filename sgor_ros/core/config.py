@@ -118,6 +118,9 @@ class SgorConfig(Settings):
     evidence_reach: float = setting(
         0.6, 'Keypoints with one of the same label nearer than this under the result agree', 'm',
         minimum=0.01, maximum=10.0)
+    rival_radius: float = setting(
+        30.0, 'Other placements that explain the scans are looked for so far from the answer; 0: '
+        'not at all (beyond the paper)', 'm', minimum=0.0, maximum=500.0)
     min_confidence: float = setting(
         0.88, 'Results below this confidence are failures; 0: accept all',
         minimum=0.0, maximum=1.0)
@@ -147,7 +150,7 @@ class SgorConfig(Settings):
             min_range=0.0, max_range=20.0, voxel_size=0.05, sigma_g=0.03, normal_radius=0.10,
             descriptor_radius=0.25, vote_radius=0.10, context_scale=0.15, height_gate=0.0,
             key_spacing=0.1, sigma_d=0.10, tau_1=0.10, ground_check=False, local_reach=0.10,
-            evidence_reach=0.10)
+            evidence_reach=0.10, rival_radius=5.0)
 
     @classmethod
     def paper(cls) -> Self:
@@ -156,4 +159,4 @@ class SgorConfig(Settings):
             robust_ground=False, drop_ground_labels=False, match_within_labels=False,
             unlabelled_attempt=False, height_gate=0.0, context_weight=0.0, moving_vote=True,
             quick_keypoints=0, groups=200, group_size=400, weight_cutoff=6.0, cloud_check=False,
-            refinement_rounds=1, local_refinement=False, min_confidence=0.0)
+            refinement_rounds=1, local_refinement=False, rival_radius=0.0, min_confidence=0.0)

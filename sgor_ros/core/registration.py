@@ -27,12 +27,11 @@ from .solver.refinement import refine
 from .solver.refinement import unobservable
 from .solver.verification import Normals
 from .solver.verification import verify
-from .trust.acceptance import judge
+from .trust.acceptance import compete
 from .trust.acceptance import judge_matches
-from .trust.evidence import View
-
-FEW_INLIERS = 50
-"""With fewer the fit is off by decimetres at the far end of a scan."""
+from .trust.acceptance import settle
+from .trust.rivals import Contest
+from .trust.view import View
 
 
 def register(source: SemanticScan | PreparedScan, target: SemanticScan | PreparedScan,
@@ -65,11 +64,11 @@ def _register(source: SemanticScan | PreparedScan, target: SemanticScan | Prepar
     if (source.scan.labels is None) != (target.scan.labels is None):
         source, target = _without_labels(source), _without_labels(target)
     for attempt in _attempts(config, labelled=source.scan.labels is not None):
-        result = _globally(source, target, attempt, clock)
+        result, contest = _globally(source, target, attempt, clock)
         if result.success:
             break
-    with clock('alignment'):
-        result = _locally(result, source, target, config)
+    if result.success and contest is not None:
+        result = _locally(result, contest, source, target, config, clock)
     return replace(result, source_ground=source.ground, target_ground=target.ground,
                    warnings=(*(f'source: {w}' for w in source.warnings),
                              *(f'target: {w}' for w in target.warnings)))
@@ -96,8 +95,8 @@ def _attempts(config: SgorConfig, *, labelled: bool) -> Iterator[SgorConfig]:
 
 
 def _globally(source: PreparedScan, target: PreparedScan, config: SgorConfig,
-              clock: Stopwatch) -> Registration:
-    """Match, solve, and ask the clouds whether to believe it (Sec. III-B to III-E)."""
+              clock: Stopwatch) -> tuple[Registration, Contest | None]:
+    """Match, solve, and let the clouds choose among the answer and its rivals."""
     with clock('matching'):
         p, q = source.features, target.features
         if config.correspondence_preprocessing and config.semantics != 'none':
@@ -106,23 +105,23 @@ def _globally(source: PreparedScan, target: PreparedScan, config: SgorConfig,
     normals = (None if source.ground is None or target.ground is None
                else (source.ground.normal, target.ground.normal))
     result = solve(correspondences, normals, (source.view, target.view), config, clock)
-    with clock('acceptance'):
-        return judge(result, source.view, target.view, source.view.cell, config)
+    with clock('rivals'):
+        return compete(result, source.view, target.view, config)
 
 
-def _locally(result: Registration, source: PreparedScan, target: PreparedScan,
-             config: SgorConfig) -> Registration:
-    """Refine on the clouds and judge again, now by near partners (beyond the paper)."""
-    if not result.success or result.T_target_source is None:
-        return result
+def _locally(result: Registration, contest: Contest, source: PreparedScan, target: PreparedScan,
+             config: SgorConfig, clock: Stopwatch) -> Registration:
+    """Refine on the clouds, and judge again beside the rivals (beyond the paper)."""
+    assert result.T_target_source is not None
     if source.surface is not None and target.surface is not None:
-        local = align(source.surface, target.surface, result.T_target_source,
-                      bool(result.inliers.sum() < FEW_INLIERS), config)
+        with clock('alignment'):
+            local = align(source.surface, target.surface, result.T_target_source, config)
         agree = distances(local.T_target_source, result.source_points,
                           result.target_points) < config.tau_1
         result = replace(result, T_target_source=local.T_target_source,
                          covariance=local.covariance, systematic=local.systematic, inliers=agree)
-    return judge(result, source.view, target.view, config.evidence_reach, config)
+    with clock('acceptance'):
+        return settle(result, contest, source.view, target.view, config)
 
 
 def register_correspondences(source_points: ArrayLike, target_points: ArrayLike,
@@ -174,7 +173,8 @@ def solve(correspondences: Correspondences, ground_normals: Normals | None,
     with clock('verification'):
         verdict = verify(hypotheses, correspondences, ground_normals, views, config)
     found = replace(found, hypotheses=hypotheses.T_target_source,
-                    passed_ground_check=verdict.passed_ground_check, best_hypothesis=verdict.best)
+                    passed_ground_check=verdict.passed_ground_check, best_hypothesis=verdict.best,
+                    hypothesis_scores=verdict.score)
     if verdict.best < 0:
         return replace(found, reason=verdict.reason)
     with clock('refinement'):

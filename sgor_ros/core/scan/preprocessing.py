@@ -12,7 +12,7 @@ from ..common.settings import InputError
 from ..common.stopwatch import Stopwatch
 from ..common.threads import cores
 from ..config import SgorConfig
-from ..trust.evidence import view
+from ..trust.view import view
 from .context import context_classes
 from .context import semantic_context
 from .descriptors import fpfh
@@ -81,9 +81,11 @@ def _prepare(scan: SemanticScan, config: SgorConfig, keypoints: ArrayLike | None
         keep = ~np.isin(regional, _unmatched_classes(convention, config))
         cloud, regional = cloud[keep], regional[keep]
     if keypoints is None and descriptors is None:
-        features = _describe(cloud, regional, config, clock)
+        features, directions = _describe(cloud, regional, config, clock)
     else:
         features = _given(keypoints, descriptors, cloud, regional, config)
+        directions = normals(features.points, radius_neighbours(
+            features.points, config.normal_radius), config.normal_radius)
     if ground is None:
         warnings.append('no ground plane found: no ground check')
     else:
@@ -92,7 +94,8 @@ def _prepare(scan: SemanticScan, config: SgorConfig, keypoints: ArrayLike | None
         if ground.source == 'geometry':
             warnings.append('no ground labels: ground plane found by geometry')
     with clock('view'):
-        sight = view(points, features, 2 * config.evidence_reach)
+        sight = view(points, features, directions, None if ground is None else ground.normal,
+                     config.evidence_reach)
     return PreparedScan(scan, config, features, ground, sight, local, tuple(warnings),
                         clock.seconds)
 
@@ -122,14 +125,15 @@ def _unmatched_classes(convention: LabelConvention, config: SgorConfig) -> list[
 
 
 def _describe(cloud: VoxelCloud, regional: NDArray[np.uint8], config: SgorConfig,
-              clock: Stopwatch) -> Features:
+              clock: Stopwatch) -> tuple[Features, NDArray[np.float64]]:
+    """Return the voxels as keypoints, and their normals."""
     with clock('neighbours'):
         neighbours = radius_neighbours(cloud.points, config.descriptor_radius)
     with clock('normals'):
         directions = normals(cloud.points, neighbours, config.normal_radius)
     with clock('descriptors'):
         described = fpfh(cloud.points, directions, neighbours)
-    return Features(cloud.points, cloud.labels, regional, described)
+    return Features(cloud.points, cloud.labels, regional, described), directions
 
 
 def _over_ground(features: Features, ground: Ground, convention: LabelConvention,

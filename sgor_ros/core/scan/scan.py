@@ -11,7 +11,7 @@ from ..common.checks import as_points
 from ..common.checks import finite_rows
 from ..common.settings import InputError
 from ..config import SgorConfig
-from ..trust.evidence import View
+from ..trust.view import View
 from .features import Features
 from .ground import Ground
 
