@@ -119,7 +119,7 @@ def _locally(result: Registration, contest: Contest, source: PreparedScan, targe
         agree = distances(local.T_target_source, result.source_points,
                           result.target_points) < config.tau_1
         result = replace(result, T_target_source=local.T_target_source,
-                         covariance=local.covariance, inliers=agree)
+                         covariance=local.covariance, systematic=local.systematic, inliers=agree)
     with clock('acceptance'):
         return settle(result, contest, source.view, target.view, config)
 
