@@ -62,36 +62,32 @@ def _register(source: SemanticScan | PreparedScan, target: SemanticScan | Prepar
     with clock('preprocessing'):
         source = source if isinstance(source, PreparedScan) else preprocess(source, config)
         target = target if isinstance(target, PreparedScan) else preprocess(target, config)
-    if (source.scan.labels is None) != (target.scan.labels is None):
-        source, target = _without_labels(source), _without_labels(target)
-    for attempt in _attempts(config, labelled=source.scan.labels is not None):
+    labelled = (source.features.labelled_share > 0, target.features.labelled_share > 0)
+    for attempt in _attempts(config, labelled=all(labelled)):
         result = _globally(source, target, attempt, clock)
         if result.success:
             break
     with clock('alignment'):
         result = _locally(result, source, target, config)
+    warnings = (*(f'source: {w}' for w in source.warnings),
+                *(f'target: {w}' for w in target.warnings))
+    if any(labelled) and not all(labelled):
+        warnings += (f'labels ignored: the {"target" if labelled[0] else "source"} has none',)
     return replace(result, source_ground=source.ground, target_ground=target.ground,
-                   warnings=(*(f'source: {w}' for w in source.warnings),
-                             *(f'target: {w}' for w in target.warnings)))
-
-
-def _without_labels(prepared: PreparedScan) -> PreparedScan:
-    """Prepare a scan again without the labels that the other scan has not."""
-    if prepared.scan.labels is None:
-        return prepared
-    again = preprocess(SemanticScan(prepared.scan.points), prepared.config)
-    return replace(again, warnings=('labels ignored: the other scan has none', *again.warnings))
+                   warnings=warnings)
 
 
 def _attempts(config: SgorConfig, *, labelled: bool) -> Iterator[SgorConfig]:
     """Yield the settings of a quick attempt with few keypoints, of all, and without labels."""
+    if not labelled:
+        config = config.replace(semantics='none')
     if 0 < config.quick_keypoints < config.max_correspondences:
         yield config.replace(max_correspondences=config.quick_keypoints,
                              groups=min(config.groups, config.quick_groups),
                              group_size=max(config.quick_keypoints // 8, config.group_keep + 1))
     yield config
     # without labels it would be the same attempt again
-    if labelled and config.unlabelled_attempt and config.semantics != 'none':
+    if config.unlabelled_attempt and config.semantics != 'none':
         yield config.replace(semantics='none')
 
 

@@ -111,7 +111,12 @@ def _usable(scan: SemanticScan, convention: LabelConvention, config: SgorConfig
     if unknown:
         warnings.append(f'label ids {unknown} are not in convention {convention.name}: '
                         'treated as unlabelled')
-    return np.compress(keep, scan.points, axis=0), labels[keep], warnings
+    labels = labels[keep]
+    if labels.any() and (labels == labels[0]).all():
+        warnings.append(f'every point is {convention.names.get(int(labels[0]), labels[0])}: '
+                        'treated as unlabelled')
+        labels[:] = UNLABELLED
+    return np.compress(keep, scan.points, axis=0), labels, warnings
 
 
 def _unmatched_classes(convention: LabelConvention, config: SgorConfig) -> list[int]:

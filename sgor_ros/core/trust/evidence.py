@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ..common import se3
 from ..common.angles import atan2
 from ..scan.features import Features
+from ..scan.labels import UNLABELLED
 
 AZIMUTHS, ELEVATIONS = 360, 180
 """Cells of the range image: 1 degree, wider than the gaps between beams."""
@@ -190,7 +191,10 @@ def _shares(points, labels, T, others, other_labels, cell, slots,  # type: ignor
 @numba.njit(cache=True, nogil=True)
 def _partner(x, y, z, label, others, other_labels, cell, slots,  # type: ignore[no-untyped-def]
              chain, reach):
-    """Return whether any point is within reach, and whether one of the same label is."""
+    """Return whether any point is within reach, and whether one of the same label is.
+
+    What has no label speaks by its place alone.
+    """
     near = False
     limit = reach * reach
     # the 8 cells around that a ball of up to half a cell can touch, 27 for a larger one
@@ -209,7 +213,8 @@ def _partner(x, y, z, label, others, other_labels, cell, slots,  # type: ignore[
                     c = others[k, 2] - z
                     if a * a + b * b + c * c <= limit:
                         near = True
-                        if other_labels[k] == label:
+                        if (other_labels[k] == label or label == UNLABELLED
+                                or other_labels[k] == UNLABELLED):
                             return True, True
                     k = chain[k]
     return near, False
