@@ -26,6 +26,9 @@ class SgorConfig(Settings):
         80.0, 'Points farther from the sensor are dropped', 'm', minimum=0.5, maximum=1000.0)
     voxel_size: float = setting(
         0.5, 'Edge of the voxel grid that thins a scan', 'm', minimum=0.01, maximum=10.0)
+    max_voxels: int = setting(
+        40000, 'Voxels of a scan; more are thinned evenly, so that any cloud ends in time',
+        minimum=100, maximum=1000000)
 
     # secondary ground segmentation (Sec. III-B, Eq. 2-3)
     sigma_g: float = setting(

@@ -18,6 +18,10 @@ from ..scan.labels import LabelConvention
 from ..scan.labels import UNLABELLED
 from ..scan.neighbours import radius_neighbours
 from ..scan.voxels import one_point_voxels
+from ..scan.voxels import thin
+
+MOST_COMPARISONS = 150_000_000
+"""Pairs of descriptors, some tenths of a second; beyond it fewer source keypoints are matched."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,11 +112,19 @@ def match(source: Features, target: Features, config: SgorConfig) -> Corresponde
     for rows, by_label in ((np.flatnonzero(free), False), (np.flatnonzero(~free), True)):
         if rows.size:
             order, first, last = _runs(source[rows], target, by_label, config)
+            asked = thin(len(rows), _affordable(first, last))
+            rows, first, last = rows[asked], first[asked], last[asked]
             found = _nearest_in_runs(described[rows], candidates[order], first, last)
             nearest[rows[found >= 0]] = order[found[found >= 0]]
     found = np.flatnonzero(nearest >= 0)
     s, t = source[found], target[nearest[found]]
     return Correspondences(s.points, t.points, s.labels, t.labels, s.regional, t.regional)
+
+
+def _affordable(first: NDArray[np.int64], last: NDArray[np.int64]) -> int:
+    """Return how many of (N, R) runs can be searched, taken evenly, by `MOST_COMPARISONS`."""
+    comparisons = int((last - first).sum())
+    return len(first) * MOST_COMPARISONS // max(comparisons, MOST_COMPARISONS)
 
 
 def _runs(source: Features, target: Features, by_label: bool, config: SgorConfig
@@ -145,13 +157,6 @@ def _runs(source: Features, target: Features, by_label: bool, config: SgorConfig
             first[rows, run] = low + np.searchsorted(sorted_run, heights[rows] - gate)
             last[rows, run] = low + np.searchsorted(sorted_run, heights[rows] + gate, side='right')
     return order, first, last
-
-
-def thin(count: int, most: int) -> NDArray[np.intp]:
-    """Return at most `most` of the indices 0 to count - 1, evenly spread."""
-    if count <= most:
-        return np.arange(count)
-    return np.linspace(0, count - 1, most).astype(np.intp)
 
 
 def _joint_descriptors(source: Features, target: Features, config: SgorConfig

@@ -28,6 +28,7 @@ from .labels import UNLABELLED
 from .neighbours import radius_neighbours
 from .scan import PreparedScan
 from .scan import SemanticScan
+from .voxels import thin
 from .voxels import voxel_grid
 from .voxels import VoxelCloud
 
@@ -68,6 +69,9 @@ def _prepare(scan: SemanticScan, config: SgorConfig, keypoints: ArrayLike | None
     with clock('voxel grid'):
         points, labels, warnings = _usable(scan, convention, config)
         cloud = voxel_grid(points, labels, config.voxel_size)
+        if len(cloud.points) > config.max_voxels:
+            warnings.append(f'{len(cloud.points)} voxels thinned to {config.max_voxels}')
+            cloud = cloud[thin(len(cloud.points), config.max_voxels)]
     with clock('surface'):
         fixed = config.moving_vote | ~np.isin(cloud.labels, list(convention.movable))
         local = surface(cloud.points[fixed], config.threads) if config.local_refinement else None
