@@ -121,7 +121,9 @@ class Tracker:
                             's: the track starts anew')
             self.reset()
         self._last_stamp_ns = stamp_ns
-        prepared = preprocess(scan, self.config)
+        prepared = preprocess(
+            scan, self.config,
+            scale_before=self._reference.prepared.scale if self._reference else None)
         warnings += prepared.warnings
         if self._reference is None:
             return self._begin(prepared, stamp_ns, np.eye(4), np.zeros((6, 6)), warnings)
