@@ -51,6 +51,8 @@ setup(
         'ros': ['ros-jazzy-rclpy[fastrtps]', 'ros-jazzy-common-interfaces'],
         'open3d': OPEN3D,
         'benchmark': [*OPEN3D, 'kiss-icp', 'kiss_matcher'],
+        # to run what docs/pose_graph.md shows
+        'slam': ['gtsam>=4.3', 'g2opy'],
         'test': ['pytest'],
         'dev': [
             'mypy',

@@ -1,17 +1,20 @@
 """SGOR: global registration of labelled LiDAR scans, and the odometry built on it."""
-from .core.common.settings import InputError
-from .core.config import SgorConfig
-from .core.registration import register
-from .core.registration import register_correspondences
-from .core.result import Registration
-from .core.scan.preprocessing import preprocess
-from .core.scan.scan import PreparedScan
-from .core.scan.scan import SemanticScan
-from .tracker import State
-from .tracker import TrackedScan
-from .tracker import Tracker
-from .tracker import TrackerConfig
+from importlib import import_module
+from typing import Any
+from typing import TYPE_CHECKING
 
-__all__ = ['InputError', 'PreparedScan', 'Registration', 'SemanticScan', 'SgorConfig',
-           'State', 'TrackedScan', 'Tracker', 'TrackerConfig', 'preprocess', 'register',
-           'register_correspondences']
+if TYPE_CHECKING:
+    from .api import *  # noqa: F403
+
+
+def __getattr__(name: str) -> Any:
+    """Load the interface when something of it is asked for.
+
+    Every module of this package runs this file first, and compiled code takes a second to load:
+    the node must know what to do about a signal before that.
+    """
+    if name == '__all__' or not name.startswith('_'):
+        api = import_module('.api', __name__)
+        if name in ('__all__', *api.__all__):
+            return getattr(api, name)
+    raise AttributeError(f'module {__name__!r} has no attribute {name!r}')

@@ -7,8 +7,13 @@ from scipy.spatial.transform import Rotation
 from sgor_ros.io.messages import point_cloud2
 from sgor_ros.io.messages import stamp_ns_of
 from sgor_ros.ros.player import Player
+from sgor_ros.ros.player import SETTLING_S
 from sgor_ros.ros.player import values_of
 from sgor_ros.ros.types import ros_type
+from sgor_ros.world import Lidar
+from sgor_ros.world import simulate
+
+START_NS = 100_000_000_000
 
 
 class Partner(Player):
@@ -21,10 +26,23 @@ class Partner(Player):
 
     def outcome(self, cloud, timeout_s=20.0):
         """Publish a cloud, wait for what the node says about it: (level, message, values)."""
-        before = len(self.diagnostics)
-        self.send(stamp_ns_of(cloud.header), cloud)
-        self.spin_until(lambda: len(self.diagnostics) > before, timeout_s, 'diagnostics')
-        return status(self.diagnostics[before])
+        before, stamp_ns = len(self.diagnostics), stamp_ns_of(cloud.header)
+
+        def told():
+            return [message for message in self.diagnostics[before:]
+                    if stamp_ns_of(message.header) == stamp_ns]
+
+        self.send(stamp_ns, cloud)
+        self.spin_until(told, timeout_s, 'diagnostics')
+        return status(told()[0])
+
+    def hear(self, kind, topic):
+        """Subscribe to a topic that the node has, and return the list that fills."""
+        heard = []
+        self.node.create_subscription(kind, topic, heard.append, 100)
+        self.spin_until(lambda: self.node.count_publishers(topic), 240.0, topic)
+        self.spin_for(SETTLING_S)
+        return heard
 
     def call(self, kind, name, request, timeout_s=20.0):
         """Call a service of the node."""
@@ -39,6 +57,13 @@ class Partner(Player):
         """Drop what was collected so far."""
         for store in (self.odometry, self.poses, self.diagnostics):
             store.clear()
+
+
+def street(count, seed=0):
+    """Return the first scans of a drive: [(stamp in ns, points, labels, true pose)]."""
+    lidar = Lidar(beams=32, columns=600)
+    return [(START_NS + round(stamp * 1e9), points, labels, pose)
+            for stamp, points, labels, pose in simulate(count, seed=seed, lidar=lidar)]
 
 
 def status(diagnostics):

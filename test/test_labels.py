@@ -1,4 +1,7 @@
 """Label conventions: what the ids of a scan mean, whoever wrote them."""
+from pathlib import Path
+import re
+
 import numpy as np
 import pytest
 import yaml
@@ -10,7 +13,26 @@ from sgor_ros import SgorConfig
 from sgor_ros.core.scan.labels import label_convention
 
 CAR, ROAD, BUILDING, VEGETATION, POLE = 1, 9, 13, 15, 18    # classes inside
-CONVENTIONS = ('semantickitti', 'semantickitti_train', 'nuscenes')
+CONVENTIONS = ('semantickitti', 'semantickitti_train', 'nuscenes', 'nuscenes16',
+               'autoware_frnet', 'autoware_ptv3', 'carla')
+# as they publish them, id after id from 0
+PUBLISHED = {
+    'nuscenes16': 'void barrier bicycle bus car construction_vehicle motorcycle pedestrian '
+                  'traffic_cone trailer truck driveable_surface other_flat sidewalk terrain '
+                  'manmade vegetation',
+    'autoware_frnet': 'drivable_surface other_flat_surface sidewalk manmade vegetation car bus '
+                      'emergency_vehicle train truck tractor_unit semi_trailer '
+                      'construction_vehicle forklift kart motorcycle bicycle pedestrian '
+                      'personal_mobility animal pushable_pullable traffic_cone debris stroller '
+                      'other_stuff noise+ghost_point unknown',
+    'autoware_ptv3': 'car truck bus bicycle pedestrian traffic_cone barrier debris '
+                     'drivable_flat non_drivable_flat vegetation building vertical_thin '
+                     'static_clutter noise',
+    'carla': 'None Roads Sidewalks Buildings Walls Fences Poles TrafficLight TrafficSigns '
+             'Vegetation Terrain Sky Pedestrians Rider Car Truck Bus Train Motorcycle Bicycle '
+             'Static Dynamic Other Water RoadLines Ground Bridge RailTrack GuardRail',
+}
+ROOT = Path(__file__).resolve().parents[1]
 
 
 def decode(name, ids):
@@ -51,15 +73,31 @@ def test_nuscenes_ego_vehicle_and_movers():
     assert unknown == []
 
 
-@pytest.mark.parametrize(('raw', 'train', 'nuscenes'), [
-    (40, 8, 24), (10, 0, 17), (50, 12, 28), (70, 14, 30), (48, 10, 26), (72, 16, 27)])
-def test_the_same_thing_is_the_same_class_in_all_conventions(raw, train, nuscenes):
+@pytest.mark.parametrize('ids', [
+    (40, 8, 24, 11, 0, 8, 1), (10, 0, 17, 4, 5, 0, 14), (50, 12, 28, 15, 3, 11, 3),
+    (70, 14, 30, 16, 4, 10, 9), (30, 5, 2, 7, 17, 4, 12), (11, 1, 14, 2, 16, 3, 19),
+    (18, 3, 23, 10, 9, 1, 15), (48, 10, 26, 13, 2, None, 2), (72, 16, 27, 14, None, None, 10),
+    (51, 13, 9, 1, None, 6, 5), (80, 17, None, None, None, 12, 6)])
+def test_the_same_thing_is_the_same_class_in_all_conventions(ids):
     """So that a scan of one convention meets one of another, with the same name."""
-    found = {decode(name, [i])[0][0] for name, i in (
-        ('semantickitti', raw), ('semantickitti_train', train), ('nuscenes', nuscenes))}
+    found = {decode(name, [i])[0][0] for name, i in zip(CONVENTIONS, ids, strict=True)
+             if i is not None}
     assert len(found) == 1
     names = {label_convention(name).names[next(iter(found))] for name in CONVENTIONS}
     assert len(names) == 1
+
+
+@pytest.mark.parametrize('name', PUBLISHED)
+def test_ids_are_those_of_the_published_list(name):
+    """Each id stands beside its published name, all are listed, noise is dropped."""
+    published = PUBLISHED[name].split()
+    text = (ROOT / f'config/labels/{name}.yaml').read_text().split('ground:')[0]
+    written = {int(i): word for i, word in re.findall(r'^  (\d+): \d+ +# (\S+)$', text, re.M)}
+    convention = label_convention(name)
+    for i, word in enumerate(published):
+        assert written.get(i, 'dropped') == word or i in convention.drop
+        assert (i in convention.drop) == word.startswith('noise')
+    assert set(convention.classes) - set(range(len(published))) <= {255}
 
 
 @pytest.mark.parametrize('name', CONVENTIONS)
@@ -130,6 +168,18 @@ def test_unknown_ids_are_told_by_preprocess():
     assert any('[77]' in w and 'semantickitti' in w for w in prepared.warnings)
     assert len(prepared.features.points) > 0
     assert (prepared.features.labels == 0).all()
+
+
+def test_thousands_of_unknown_ids_are_told_in_a_line():
+    """As with a field that holds no class ids; and that they are most of the points."""
+    points = np.random.default_rng(0).uniform(-20, 20, (5000, 3))
+    warning, = (w for w in preprocess(SemanticScan(points, 1000 + np.arange(5000))).warnings
+                if 'label ids' in w)
+    assert '[1000, 1001, 1002, 1003, 1004, ... 5000 in all]' in warning
+    assert '100% of the points: is label_convention right?' in warning
+    assert len(warning) < 300
+    few = np.where(np.arange(5000) < 2000, 77, 50)
+    assert not any('right?' in w for w in preprocess(SemanticScan(points, few)).warnings)
 
 
 def test_dropped_ids_leave_no_keypoints():

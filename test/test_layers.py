@@ -12,13 +12,14 @@ PACKAGE = Path(sgor_ros.__file__).parent
 SHELLS = {'io', 'ros', 'commands', 'evaluation'}
 ROS = {'rclpy', 'ament_index_python', 'launch', 'launch_ros', 'sensor_msgs', 'nav_msgs',
        'geometry_msgs', 'visualization_msgs', 'diagnostic_msgs', 'std_msgs', 'std_srvs',
-       'builtin_interfaces', 'rcl_interfaces', 'tf2_msgs'}
+       'builtin_interfaces', 'rcl_interfaces', 'tf2_msgs', 'tf2_ros'}
 FILES = {'rosbags', 'matplotlib', 'tqdm', 'argparse'}
 
 # module or folder -> what it may import of the package besides itself
 MAY_IMPORT = {
     'core': set(),
     'tracker': {'core'},
+    'api': {'core', 'tracker'},
     'io': {'core', 'tracker'},
     'evaluation': {'core', 'tracker', 'io'},
     'ros': {'core', 'tracker', 'io'},
@@ -67,14 +68,23 @@ def test_a_file_imports_only_what_is_below_it(path):
 
 
 def test_the_public_interface_is_core_and_tracker():
-    layers = {name.split('.')[1] for name in imports_of(PACKAGE / '__init__.py')}
+    layers = {name.split('.')[1] for name in imports_of(PACKAGE / 'api.py')}
     assert layers == {'core', 'tracker'}
+
+
+def test_the_package_loads_its_interface_only_when_asked():
+    code = ('import sys, sgor_ros; light = "numpy" not in sys.modules\n'
+            'from sgor_ros import *\n'
+            'print(light, all(name in globals() for name in sgor_ros.__all__))')
+    done = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True,
+                          cwd=PACKAGE.parent, check=True)
+    assert done.stdout.split() == ['True', 'True']
 
 
 def test_core_and_tracker_load_neither_ros_nor_files():
     shells = [f'sgor_ros.{name}' for name in (*SHELLS, 'world')]
     unwanted = [*ROS, *FILES - {'argparse'}, 'open3d', *shells]
-    code = ('import importlib, pkgutil, sys, sgor_ros, sgor_ros.core\n'
+    code = ('import importlib, pkgutil, sys, sgor_ros.api, sgor_ros.core\n'
             'for module in pkgutil.walk_packages(sgor_ros.core.__path__, "sgor_ros.core."):\n'
             '    importlib.import_module(module.name)\n'
             f'print(*(name for name in {unwanted} if name in sys.modules))')

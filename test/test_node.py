@@ -1,11 +1,8 @@
 """The node as users have it: a process of its own, real DDS, real clouds."""
 from importlib.util import find_spec
 from pathlib import Path
-import re
-import signal
 import subprocess
 import sys
-import time
 
 import numpy as np
 import pytest
@@ -253,14 +250,13 @@ def all_nan(cloud):
 
 
 @pytest.mark.parametrize(('spoil', 'words'), [
-    (without_label, ['label', 'x, y, z']),
     (empty, ['0', 'empty']),
     (all_nan, ['finite']),
     (truncated, ['data', 'bytes']),
     (field_of_type(FLOAT64), ['label', 'point_step']),
     (a_fraction, ['label', '40.5', 'not a whole number']),
     (field_of_type(99), ['label', '99']),
-], ids=['no label field', 'no points', 'all NaN', 'truncated', 'label too wide',
+], ids=['no points', 'all NaN', 'truncated', 'label too wide',
         'label a fraction', 'label of no type'])
 def test_a_bad_cloud_is_named_and_the_node_goes_on(partner, shared_node, street, spoil, words):
     first, bad, good = clouds_of(street[:3])
@@ -275,6 +271,48 @@ def test_a_bad_cloud_is_named_and_the_node_goes_on(partner, shared_node, street,
     partner.spin_until(lambda: len(partner.odometry) == 2)
     assert ros.stamp_ns_of(partner.odometry[1].header) == street[2][0]
     assert_right(partner.odometry[1], street[2], street[0])
+
+
+def test_a_cloud_without_labels_is_worked_on_without(partner, shared_node, street):
+    bare = clouds_of(street[:3])
+    for cloud in bare:
+        without_label(cloud)
+        assert partner.outcome(cloud)[0] != ERROR
+    partner.spin_until(lambda: len(partner.odometry) == 3)
+    assert_right(partner.odometry[2], street[2], street[0])
+    assert shared_node.log.read_text().count('works without labels: none of') == 1
+
+
+@pytest.mark.parametrize(('field', 'words'), [
+    ('x', 'field x: it holds coordinates'), ('nonsense', 'field nonsense: the cloud has none')])
+def test_a_wrong_label_field_is_told_and_kills_nothing(domain, street, tmp_path, field, words):
+    with NodeProcess(domain, tmp_path / 'log', '-r', '__ns:=/wrong', '-p',
+                     f'label_field:={field}') as node, ros.Partner(domain, '/wrong/') as partner:
+        partner.wait_for_node(node.alive)
+        for cloud in clouds_of(street[:3]):
+            level, message, _ = partner.outcome(cloud)
+            assert level == ERROR
+            assert words in message
+        assert node.stop() == 0
+    assert node.log.read_text().count(words) == 1
+    assert 'failed 3' in node.log.read_text()
+
+
+def test_class_ids_are_read_from_the_field_of_another_name(domain, street, tmp_path):
+    """As Autoware writes them; and a wrong convention is told in a short line."""
+    with NodeProcess(domain, tmp_path / 'log', '-r', '__ns:=/class') as node, \
+            ros.Partner(domain, '/class/') as partner:
+        partner.wait_for_node(node.alive)
+        for (stamp, points, labels, _), shift in zip(street[:3], (0, 0, 5000), strict=True):
+            cloud = ros.cloud(points, labels + shift, stamp)
+            cloud.fields[-1].name = 'class_id'
+            level, message, _ = partner.outcome(cloud)
+        assert level != OK
+        assert '100% of the points: is label_convention right?' in message
+        assert node.stop() == 0
+    log = node.log.read_text()
+    assert log.count('class ids are read from the field class_id') == 1
+    assert max(map(len, log.splitlines())) < 500
 
 
 @pytest.mark.parametrize('rows', [slice(1), slice(40)], ids=['one point', 'forty points'])
@@ -372,27 +410,6 @@ def test_real_scans_at_ten_hertz(partner, kitti):
     assert int(after['received']) - int(before['received']) == len(kitti) - 1
     assert len(partner.odometry) == len(kitti) - replaced
     assert_good_end(partner.odometry[-1], kitti)
-
-
-@pytest.mark.parametrize(('how', 'times'), [(signal.SIGINT, 1), (signal.SIGINT, 2),
-                                             (signal.SIGTERM, 1)])
-def test_a_signal_at_work_ends_it_cleanly(domain, street, tmp_path, how, times):
-    node = NodeProcess(domain, tmp_path / 'log', '-r', '__ns:=/ending')
-    partner = ros.Partner(domain, '/ending/')
-    try:
-        partner.wait_for_node()
-        partner.play(ros.stamped(clouds_of(street[:4])), 0.02)
-        partner.spin_until(lambda: partner.diagnostics)
-    finally:
-        for _ in range(times):
-            node.process.send_signal(how)
-            time.sleep(0.02)
-        code = node.process.wait(30)
-        partner.close()
-    assert code == 0
-    last = node.log.read_text().splitlines()[-1]
-    assert re.fullmatch(r'received \d, processed \d, replaced \d, failed 0', last)
-    assert 'Traceback' not in node.log.read_text()
 
 
 def test_users_files_namespace_and_a_best_effort_driver(domain, street, tmp_path):

@@ -11,6 +11,8 @@ from sgor_ros import InputError
 from sgor_ros import Registration
 from sgor_ros import TrackedScan
 from sgor_ros.io import messages
+from sgor_ros.io.label_field import choice_in_words
+from sgor_ros.io.label_field import label_field_of
 from sgor_ros.io.pointcloud2 import decode
 
 CODES = {'i1': 1, 'u1': 2, 'i2': 3, 'u2': 4, 'i4': 5, 'u4': 6, 'f4': 7, 'f8': 8}
@@ -39,7 +41,8 @@ def cloud(points, labels, columns, padding=0, rows=1, row_padding=0, big=False):
     values = np.zeros(len(points), record)
     for name, source in zip('xyz', points.T, strict=True):
         values[name] = source
-    values['label'] = labels
+    for name in {'label', 'class_id', 'ObjTag'}.intersection(record.names):
+        values[name] = labels
     width = len(points) // rows
     lines = [values[i * width:(i + 1) * width].tobytes() + b'\xee' * row_padding
              for i in range(rows)]
@@ -76,6 +79,38 @@ def test_layouts(layout):
     result = decode(cloud(points, labels, **layout), 'label')
     np.testing.assert_array_equal(result.points, points)
     np.testing.assert_array_equal(result.labels, labels)
+
+
+def test_the_packed_points_of_autoware_ptv3():
+    """21 bytes a point, so nearly no number of them is aligned."""
+    points, labels = scan(1001)
+    message = cloud(points, labels, [*XYZ, ('class_id', 'u1'), ('probability', 'f4'),
+                                     ('entropy', 'f4')])
+    assert message.point_step == 21
+    result = decode(message, label_field_of(message, 'auto'))
+    np.testing.assert_array_equal(result.points, points)
+    np.testing.assert_array_equal(result.labels, labels)
+
+
+@pytest.mark.parametrize(('names', 'wanted', 'chosen'), [
+    (['label'], 'auto', 'label'), (['class_id'], 'auto', 'class_id'),
+    (['ObjIdx', 'ObjTag'], 'auto', 'ObjTag'), (['class_id', 'label'], 'auto', 'label'),
+    (['class_id', 'label'], 'class_id', 'class_id'), (['label'], 'mine', 'mine'),
+    (['intensity'], 'auto', ''), (['label'], 'none', ''), (['label'], '', '')])
+def test_which_field_is_read(names, wanted, chosen):
+    message = SimpleNamespace(fields=[SimpleNamespace(name=name) for name in names])
+    assert label_field_of(message, wanted) == chosen
+    words = choice_in_words(message, wanted)
+    assert bool(words) == (wanted == 'auto')
+    if words:
+        assert (chosen or 'without labels: none of') in words
+        assert chosen or 'is among intensity' in words
+
+
+@pytest.mark.parametrize('name', ['x', 'y', 'z'])
+def test_coordinates_are_no_class_ids(name):
+    with pytest.raises(InputError, match=f'field {name}: it holds coordinates'):
+        decode(cloud(*scan(), [*XYZ, ('label', 'f4')]), name)
 
 
 def test_large_ids_keep_their_instance_bits():
@@ -169,10 +204,13 @@ def test_odometry_has_pose_covariance_and_twist_where_ros_has_them():
     assert message.twist.twist.angular.z == 5.0
 
 
-def test_unknown_covariance_is_marked():
+def test_what_is_unknown_weighs_nothing_in_any_axis():
     message = messages.odometry(bag_type, tracked(covariance=None), 'odom', 'lidar')
-    assert message.pose.covariance[0] == -1.0
-    assert message.twist.covariance[0] == -1.0
+    for part in (message.pose, message.twist):
+        # a filter inverts it: no axis may be exact, none may be negative
+        information = np.linalg.inv(part.covariance.reshape(6, 6))
+        assert (np.linalg.eigvalsh(information) > 0).all()
+        assert np.abs(information).max() < 1e-5
 
 
 def test_lines_of_inliers_have_no_length_in_the_odom_frame():

@@ -24,7 +24,9 @@ from sgor_ros.commands.kitti_to_bag import main as kitti_to_bag
 from sgor_ros.commands.replay import main
 from sgor_ros.io.bags import BagReader
 from sgor_ros.io.bags import BagWriter
+from sgor_ros.io.frames import parse_transform
 from sgor_ros.io.messages import header
+from sgor_ros.io.messages import matrix_of
 from sgor_ros.io.messages import point_cloud2
 from sgor_ros.io.messages import stamp_ns_of
 from sgor_ros.io.trajectories import read_kitti
@@ -88,7 +90,7 @@ def test_results_in_a_bag(replayed):
         found = {topic: [] for topic in bag.topics}
         for connection, time_ns, raw in bag.messages():
             found[connection.topic].append((time_ns, bag.deserialize(raw, connection.msgtype)))
-    assert found.keys() == {'/odometry', '/pose', '/correspondences'}
+    assert found.keys() == {'/odometry', '/pose', '/relative_pose', '/correspondences'}
     for i, (time_ns, message) in enumerate(found['/odometry']):
         assert time_ns == stamp_ns_of(message.header) == i * PERIOD_NS
         assert (message.header.frame_id, message.child_frame_id) == ('odom', 'lidar')
@@ -171,11 +173,37 @@ def test_time_that_runs_backwards_starts_anew(street, tmp_path, capsys):
 
 def test_missing_label_field_tells_the_fields(street, tmp_path, capsys):
     bag = write_bag(tmp_path / 'bag', [(street[0][0], None, 0), (street[1][0], None, PERIOD_NS)])
-    assert main([str(bag), '--output', str(tmp_path)]) == 2
+    assert main([str(bag), '--output', str(tmp_path), '--label-field', 'label']) == 2
     assert 'none of 2 clouds could be used: field label: the cloud has none; its fields are ' \
         'x, y, z' in capsys.readouterr().err
-    assert main([str(bag), '--output', str(tmp_path), '--label-field', '']) == 0
-    assert summary(tmp_path)['successes'] == 2
+    assert main([str(bag), '--output', str(tmp_path), '--label-field', 'x']) == 2
+    assert 'field x: it holds coordinates' in capsys.readouterr().err
+    for field, told in (('auto', 1), ('none', 0)):
+        assert main([str(bag), '--output', str(tmp_path), '--label-field', field]) == 0
+        assert summary(tmp_path)['successes'] == 2
+        assert capsys.readouterr().err.count('works without labels') == told
+
+
+def test_the_track_of_a_base(street, street_bag, tmp_path, capsys):
+    """As the node publishes it: the base begins at the origin, whatever the sensor sees."""
+    mount = '1.2 -0.3 1.8 0.05 0.1 1.5'
+    options = ['--output', str(tmp_path), '--base-frame', 'base_link']
+    assert main([str(street_bag), *options]) == 2
+    assert 'it needs T_base_sensor' in capsys.readouterr().err
+    assert main([str(street_bag), *options, '--bag', '--T-base-sensor', mount]) == 0
+    T_sensor_base = np.linalg.inv(parse_transform(mount, 'mount'))
+    bases = [pose @ T_sensor_base for *_, pose in street]
+    for found, base in zip(read_kitti(tmp_path / 'trajectory_kitti.txt'), bases, strict=True):
+        assert errors(found, relative(bases[0], base))[0] < 0.15
+    with AnyReader([tmp_path / 'bag']) as reader:
+        found = [(connection.topic, reader.deserialize(raw, connection.msgtype))
+                 for connection, _, raw in reader.messages()]
+    odometry = [message for topic, message in found if topic == '/odometry']
+    edges = [message for topic, message in found if topic == '/relative_pose']
+    assert {message.child_frame_id for message in odometry} == {'base_link'}
+    assert edges[0].header.frame_id == 'lidar@0'
+    assert edges[0].child_frame_id == f'lidar@{PERIOD_NS}'
+    assert errors(matrix_of(edges[0].pose.pose), relative(street[0][2], street[1][2]))[0] < 0.1
 
 
 @pytest.fixture

@@ -1,20 +1,15 @@
 """`sgor_replay`: the tracker over a bag, without ROS; the same poses as the node's."""
 from argparse import ArgumentParser
 from argparse import Namespace
-from collections.abc import Iterator
 from contextlib import ExitStack
 from dataclasses import asdict
-from dataclasses import dataclass
-from dataclasses import field
 import json
 import math
 from pathlib import Path
 import sys
-import time
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from tqdm import tqdm
 
 from ..core.common.settings import InputError
@@ -22,16 +17,12 @@ from ..core.config import SgorConfig
 from ..core.scan.labels import label_convention
 from ..core.warmup import warm_up
 from ..evaluation.track_plots import plot_track
-from ..io import messages
 from ..io.bags import BagReader
 from ..io.bags import BagWriter
-from ..io.bags import RecordedCloud
 from ..io.environment import describe_environment
-from ..io.pointcloud2 import decode
 from ..io.stream_config import StreamConfig
 from ..io.trajectories import write_kitti
 from ..io.trajectories import write_tum
-from ..tracker import TrackedScan
 from ..tracker import Tracker
 from ..tracker import TrackerConfig
 from .options import add_params_file
@@ -40,23 +31,9 @@ from .options import configured
 from .options import parser
 from .options import read_parameters
 from .options import run
-
-# then the terminal has seen enough; summary.json has them all
-PRINTED_WARNINGS = 20
-
-
-@dataclass(frozen=True, eq=False)
-class Row:
-    """What is kept of a scan: little, for a bag may have many."""
-
-    stamp_ns: int
-    reason: str
-    T_odom_sensor: NDArray[np.float64] | None = None
-    restarted: bool = False
-    inliers: int | None = None
-    confidence: float = math.nan
-    seconds: float = math.nan
-    timings: dict[str, float] = field(default_factory=dict)
+from .replay_steps import Row
+from .replay_steps import Steps
+from .replay_steps import Warnings
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -83,9 +60,10 @@ def replay(arguments: Namespace) -> int:
         output.mkdir(parents=True, exist_ok=True)
         writer = stack.enter_context(BagWriter(output / 'bag')) if arguments.bag else None
         warm_up(tracker.config)
+        steps = Steps(tracker, stream, writer, warnings)
         try:
             for cloud in tqdm(clouds, total=expected, unit='scan', disable=None):
-                rows.append(_step(tracker, cloud, stream, writer, warnings))
+                rows.append(steps.take(cloud))
         except InputError as error:
             broken = error    # what came before is worth keeping
     if broken and not rows:
@@ -116,58 +94,6 @@ def _parser() -> ArgumentParser:
     add_settings(command, 'tracker', TrackerConfig.settings())
     add_settings(command, 'registration', SgorConfig.settings())
     return command
-
-
-class Warnings:
-    """Tells each text once, above the progress bar."""
-
-    def __init__(self) -> None:
-        self.texts: list[str] = []
-
-    def add(self, text: str) -> None:
-        """Tell `text`, if it is new."""
-        if text in self.texts:
-            return
-        self.texts.append(text)
-        if len(self.texts) <= PRINTED_WARNINGS:
-            tqdm.write(f'warning: {text}', file=sys.stderr)
-        elif len(self.texts) == PRINTED_WARNINGS + 1:
-            tqdm.write('warning: more of them are in summary.json', file=sys.stderr)
-
-
-def _step(tracker: Tracker, cloud: RecordedCloud, stream: StreamConfig, writer: BagWriter | None,
-          warnings: Warnings) -> Row:
-    """Track one cloud; a broken one is a row without a pose."""
-    stamp_ns = cloud.bag_time_ns
-    start = time.perf_counter()
-    try:
-        stamp_ns, frame_id, message = cloud.read()
-        tracked = tracker.track(decode(message, stream.label_field), stamp_ns)
-    except InputError as error:
-        warnings.add(f'scan at {stamp_ns * 1e-9:.3f} s left out: {error}')
-        return Row(stamp_ns, str(error))
-    seconds = time.perf_counter() - start
-    for text in tracked.warnings:
-        warnings.add(text)
-    if not tracked.success:
-        warnings.add(f'scan at {stamp_ns * 1e-9:.3f} s has no pose: {tracked.reason}')
-    if writer:
-        for topic, result in _results(writer, tracked, stream, frame_id):
-            writer.write(topic, result, cloud.bag_time_ns)
-    step = tracked.registration
-    return Row(stamp_ns, tracked.reason, tracked.T_odom_sensor, tracked.restarted,
-               None if step is None else int(step.inliers.sum()),
-               math.nan if step is None else step.confidence, seconds, tracked.timings)
-
-
-def _results(writer: BagWriter, tracked: TrackedScan, stream: StreamConfig, frame_id: str
-             ) -> Iterator[tuple[str, Any]]:
-    """Yield what the node would publish: topic and message."""
-    types, odom = writer.types, stream.odom_frame
-    if tracked.success:
-        yield '/odometry', messages.odometry(types, tracked, odom, stream.sensor_frame or frame_id)
-        yield '/pose', messages.pose_stamped(types, tracked, odom)
-    yield '/correspondences', messages.correspondence_markers(types, tracked, odom)
 
 
 def _summary(rows: list[Row], warnings: list[str], bag: Path, topic: str, tracker: Tracker,

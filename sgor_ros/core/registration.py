@@ -14,6 +14,7 @@ from .matching.correspondences import given_correspondences
 from .matching.correspondences import match
 from .matching.correspondences import overlap_region
 from .result import Registration
+from .scan.preprocessing import at_scale
 from .scan.preprocessing import preprocess
 from .scan.scan import PreparedScan
 from .scan.scan import SemanticScan
@@ -61,36 +62,44 @@ def _register(source: SemanticScan | PreparedScan, target: SemanticScan | Prepar
     with clock('preprocessing'):
         source = source if isinstance(source, PreparedScan) else preprocess(source, config)
         target = target if isinstance(target, PreparedScan) else preprocess(target, config)
-    if (source.scan.labels is None) != (target.scan.labels is None):
-        source, target = _without_labels(source), _without_labels(target)
-    for attempt in _attempts(config, labelled=source.scan.labels is not None):
+        if source.scale != target.scale:    # the coarser one costs less and sees farther
+            source, target = (at_scale(scan, max(source.scale, target.scale))
+                              for scan in (source, target))
+    config = config.scaled(source.scale)
+    labelled = (source.features.labelled_share > 0, target.features.labelled_share > 0)
+    doubtful = source.scale < 1 and any(
+        scan.ground is None or scan.ground.source == 'geometry' for scan in (source, target))
+    for attempt in _attempts(config, labelled=all(labelled), level=not doubtful):
         result, contest = _globally(source, target, attempt, clock)
         if result.success:
             break
     if result.success and contest is not None:
         result = _locally(result, contest, source, target, config, clock)
+    warnings = (*(f'source: {w}' for w in source.warnings),
+                *(f'target: {w}' for w in target.warnings))
+    if any(labelled) and not all(labelled):
+        warnings += (f'labels ignored: the {"target" if labelled[0] else "source"} has none',)
     return replace(result, source_ground=source.ground, target_ground=target.ground,
-                   warnings=(*(f'source: {w}' for w in source.warnings),
-                             *(f'target: {w}' for w in target.warnings)))
+                   warnings=warnings)
 
 
-def _without_labels(prepared: PreparedScan) -> PreparedScan:
-    """Prepare a scan again without the labels that the other scan has not."""
-    if prepared.scan.labels is None:
-        return prepared
-    again = preprocess(SemanticScan(prepared.scan.points), prepared.config)
-    return replace(again, warnings=('labels ignored: the other scan has none', *again.warnings))
+def _attempts(config: SgorConfig, *, labelled: bool, level: bool) -> Iterator[SgorConfig]:
+    """Yield the settings of a quick attempt with few keypoints, of all, and without labels.
 
-
-def _attempts(config: SgorConfig, *, labelled: bool) -> Iterator[SgorConfig]:
-    """Yield the settings of a quick attempt with few keypoints, of all, and without labels."""
+    Where the ground planes may be of walls or tables, each again with whatever is level.
+    """
+    if not labelled:
+        config = config.replace(semantics='none')
+    tilted = config.replace(ground_check=False, height_gate=0.0, context_weight=0.0)
+    ways = (config,) if level or config == tilted else (config, tilted)
     if 0 < config.quick_keypoints < config.max_correspondences:
-        yield config.replace(max_correspondences=config.quick_keypoints,
-                             groups=min(config.groups, config.quick_groups),
-                             group_size=max(config.quick_keypoints // 8, config.group_keep + 1))
-    yield config
+        for way in ways:
+            yield way.replace(max_correspondences=config.quick_keypoints,
+                              groups=min(config.groups, config.quick_groups),
+                              group_size=max(config.quick_keypoints // 8, config.group_keep + 1))
+    yield from ways
     # without labels it would be the same attempt again
-    if labelled and config.unlabelled_attempt and config.semantics != 'none':
+    if config.unlabelled_attempt and config.semantics != 'none':
         yield config.replace(semantics='none')
 
 

@@ -18,8 +18,9 @@ from rosbags.typesys import get_typestore
 from rosbags.typesys import Stores
 
 from ..core.common.settings import InputError
+from .label_field import field_names
+from .label_field import label_field_of
 from .messages import stamp_ns_of
-from .pointcloud2 import field_names
 
 CLOUD_TYPE = 'sensor_msgs/msg/PointCloud2'
 
@@ -85,14 +86,19 @@ class BagReader:
     def find_topic(self, label_field: str) -> str:
         """Return the one topic of labelled clouds, or the one topic of clouds.
 
+        Parameters
+        ----------
+        label_field : str
+            As `label_field_of` takes it.
+
         Raises
         ------
         InputError
             There is none, or more than one.
         """
         topics = list(self.cloud_topics())
-        if len(topics) > 1 and label_field:
-            topics = [t for t in topics if label_field in self._first_fields(t)] or topics
+        if len(topics) > 1:
+            topics = [t for t in topics if self._is_labelled(t, label_field)] or topics
         if not topics:
             others = sorted({c.topic for c in self._reader.connections})
             raise InputError(f'{self.path}: no PointCloud2 in this bag; its topics are '
@@ -121,11 +127,12 @@ class BagReader:
             for _, time_ns, raw in self._reader.messages(connections):
                 yield RecordedCloud(time_ns, partial(self._read, raw))
 
-    def _first_fields(self, topic: str) -> list[str]:
+    def _is_labelled(self, topic: str, label_field: str) -> bool:
         try:
-            return field_names(next(self.clouds(topic)).read()[2])
+            first = next(self.clouds(topic)).read()[2]
         except (InputError, StopIteration):
-            return []
+            return False
+        return label_field_of(first, label_field) in field_names(first)
 
     def _read(self, raw: bytes) -> tuple[int, str, Any]:
         with _readable('a message of the bag'):

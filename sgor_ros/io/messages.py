@@ -20,8 +20,9 @@ from .pointcloud2 import encode
 
 Types = Callable[[str], Any]
 
-# REP 145 and sensor_msgs: a first element of -1 says that the covariance is not known
-UNKNOWN_COVARIANCE = -1.0
+# m^2, rad^2 and their rates: what is not known gets variances that leave it no weight. The -1 of
+# sensor_msgs is no covariance, and robot_localization makes an exact measurement of it.
+UNKNOWN_VARIANCE = 1e6
 
 # what a person can tell apart in RViz, and what Python can send at 10 Hz
 MAX_INLIER_LINES = 1000
@@ -72,9 +73,27 @@ def pose(types: Types, T: NDArray[np.float64]) -> Any:
 
 def matrix_of(pose: Any) -> NDArray[np.float64]:
     """Return the (4, 4) transformation of a geometry_msgs/msg/Pose."""
-    x, q = pose.position, pose.orientation
+    return _matrix(pose.position, pose.orientation)
+
+
+def matrix_of_transform(transform: Any) -> NDArray[np.float64]:
+    """Return the (4, 4) transformation of a geometry_msgs/msg/Transform."""
+    return _matrix(transform.translation, transform.rotation)
+
+
+def _matrix(x: Any, q: Any) -> NDArray[np.float64]:
     return se3.compose(Rotation.from_quat([q.x, q.y, q.z, q.w]).as_matrix(),
                        np.array([x.x, x.y, x.z]))
+
+
+def transform_stamped(types: Types, T: NDArray[np.float64], stamp_ns: int, frame: str,
+                      child_frame: str) -> Any:
+    """Return a geometry_msgs/msg/TransformStamped of a (4, 4) pose of the child in the frame."""
+    vector = types('geometry_msgs/msg/Vector3')
+    return types('geometry_msgs/msg/TransformStamped')(
+        header=header(types, stamp_ns, frame), child_frame_id=child_frame,
+        transform=types('geometry_msgs/msg/Transform')(
+            translation=_point(vector, T[:3, 3]), rotation=pose(types, T).orientation))
 
 
 def pose_stamped(types: Types, tracked: TrackedScan, odom_frame: str) -> Any:
@@ -86,11 +105,27 @@ def pose_stamped(types: Types, tracked: TrackedScan, odom_frame: str) -> Any:
 def odometry(types: Types, tracked: TrackedScan, odom_frame: str, sensor_frame: str) -> Any:
     """Return a nav_msgs/msg/Odometry of a scan that has a pose.
 
-    The twist is in the sensor frame. What is not known has -1 in the first element of its
-    covariance: the pose where a step gave no covariance, and the twist always.
+    The twist is in the sensor frame. What is not known has `UNKNOWN_VARIANCE` on the diagonal of
+    its covariance: the pose where a step gave no covariance, and the twist always.
     """
     return odometry_of(types, _pose_of(tracked), tracked.stamp_ns, odom_frame, sensor_frame,
                        tracked.covariance, tracked.twist)
+
+
+def relative_pose(types: Types, tracked: TrackedScan, sensor_frame: str) -> Any:
+    """Return a nav_msgs/msg/Odometry of the step from a scan to its reference: a graph's edge.
+
+    Both frames carry the stamps of their scans: ``lidar@100200000000`` is where `sensor_frame`
+    was then. The pose of the scan (child) in the reference is T_target_source, its covariance
+    that of the registration alone.
+    """
+    step, reference_ns = tracked.registration, tracked.reference_stamp_ns
+    assert step is not None, 'only scans with a step are relative to something'
+    assert step.T_target_source is not None
+    assert reference_ns is not None
+    return odometry_of(types, step.T_target_source, tracked.stamp_ns,
+                       f'{sensor_frame}@{reference_ns}', f'{sensor_frame}@{tracked.stamp_ns}',
+                       step.covariance)
 
 
 def odometry_of(types: Types, T: NDArray[np.float64], stamp_ns: int, frame: str,
@@ -174,9 +209,7 @@ def _covariance(covariance: NDArray[np.float64] | None) -> NDArray[np.float64]:
     """Return the 36 numbers of a ROS covariance, row by row."""
     if covariance is not None:
         return np.ascontiguousarray(covariance, np.float64).reshape(36)
-    unknown = np.zeros(36)
-    unknown[0] = UNKNOWN_COVARIANCE
-    return unknown
+    return np.diag(np.full(6, UNKNOWN_VARIANCE)).reshape(36)
 
 
 def _byte_array(message: Any, data: NDArray[np.uint8]) -> Any:

@@ -10,6 +10,7 @@ from ..core.common.checks import as_labels
 from ..core.common.checks import as_points
 from ..core.common.settings import InputError
 from ..core.scan.scan import SemanticScan
+from .label_field import field_names
 
 # the datatypes of sensor_msgs/msg/PointField
 FORMATS = {1: 'i1', 2: 'u1', 3: 'i2', 4: 'u2', 5: 'i4', 6: 'u4', 7: 'f4', 8: 'f8'}
@@ -28,13 +29,16 @@ def decode(message: Any, label_field: str) -> SemanticScan:
     message : sensor_msgs/msg/PointCloud2
         Of rclpy or of rosbags: only the names of its fields matter.
     label_field : str
-        Field with the class ids, of any integer or float type; empty for a scan without labels.
+        Field with the class ids, of any integer or float type; empty for a scan without labels
+        (see `label_field_of`).
 
     Raises
     ------
     InputError
         A field is missing or unusable, the data is shorter than the cloud, no point is finite.
     """
+    if label_field in ('x', 'y', 'z'):
+        raise InputError(f'field {label_field}: it holds coordinates, not class ids')
     names = ('x', 'y', 'z', *((label_field,) if label_field else ()))
     records = _records(message, names)
     points = np.empty((len(records), 3), np.float32)
@@ -44,11 +48,6 @@ def decode(message: Any, label_field: str) -> SemanticScan:
         return SemanticScan(points)
     return SemanticScan(points, whole_numbers(records[label_field], points,
                                               f'field {label_field}'))
-
-
-def field_names(message: Any) -> list[str]:
-    """Return the names of the fields of a cloud."""
-    return [field.name for field in message.fields]
 
 
 def _records(message: Any, names: tuple[str, ...]) -> NDArray[Any]:

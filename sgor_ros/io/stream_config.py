@@ -4,6 +4,9 @@ from dataclasses import dataclass
 from ..core.common.settings import InputError
 from ..core.common.settings import setting
 from ..core.common.settings import Settings
+from .frames import parse_transform
+from .label_field import AUTO
+from .label_field import LABEL_FIELDS
 
 
 @dataclass(frozen=True)
@@ -11,18 +14,28 @@ class StreamConfig(Settings):
     """Field of the labels and names of the frames."""
 
     label_field: str = setting(
-        'label', 'Field of the clouds that holds the class ids; empty: work without labels')
+        AUTO, 'Field of the clouds that holds the class ids; auto: the first of '
+        f'{", ".join(LABEL_FIELDS)} that a cloud has; none: work without labels')
     odom_frame: str = setting(
         'odom', 'Frame of the published poses; its origin is the first scan')
     sensor_frame: str = setting(
         '', 'Frame of the sensor in what is published; empty: the frame_id of each scan')
+    base_frame: str = setting(
+        '', 'Frame whose odometry is published, such as base_link; empty: the frame of the sensor')
+    T_base_sensor: str = setting(
+        '', 'Pose of the sensor in base_frame, x y z roll pitch yaw as in a URDF, m and rad; '
+        'empty: the node looks it up in tf2 at the stamp of each scan')
 
     def __post_init__(self) -> None:
         """Check the frames too."""
         super().__post_init__()
         if not self.odom_frame:
             raise InputError("odom_frame = '': a frame needs a name")
-        for name in ('odom_frame', 'sensor_frame'):
+        if self.T_base_sensor:
+            parse_transform(self.T_base_sensor, 'T_base_sensor')
+            if not self.base_frame:
+                raise InputError(f'T_base_sensor = {self.T_base_sensor!r}: it needs a base_frame')
+        for name in ('odom_frame', 'sensor_frame', 'base_frame'):
             if getattr(self, name).startswith('/'):
                 raise InputError(f'{name} = {getattr(self, name)!r}: frame ids have no leading '
                                  'slash')

@@ -7,15 +7,29 @@ from rclpy.event_handler import QoSRequestedIncompatibleQoSInfo
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import qos_policy_name_from_kind
+from rclpy.qos import QoSPolicyKind
 from rclpy.qos import QoSProfile
 from rclpy.qos import ReliabilityPolicy
+from rclpy.qos_overriding_options import QoSOverridingOptions
 from rclpy.subscription import Subscription
 from sensor_msgs.msg import PointCloud2
 
+from ..core.common.settings import InputError
+from .publishers import OVERRIDE_ERRORS
+from .publishers import PREFIX
+
 # taken at once, so this only bridges the moments in which the receiving thread has to wait
 DEPTH = 5
+# the reliability has a parameter of its own
+OVERRIDES = (QoSPolicyKind.HISTORY, QoSPolicyKind.DEPTH)
 PATIENCE_S = 5.0
 REMINDER_S = 30.0
+
+
+def override_names(node: Node) -> list[str]:
+    """Return the QoS overrides that the subscription asks for."""
+    topic = node.resolve_topic_name('points')
+    return [f'{PREFIX}{topic}.subscription.{kind.name.lower()}' for kind in OVERRIDES]
 
 
 class Clouds:
@@ -35,9 +49,15 @@ class Clouds:
         node.create_timer(PATIENCE_S, self._watch, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def _subscribe(self, reliability: ReliabilityPolicy) -> Subscription:
-        return self._node.create_subscription(
-            PointCloud2, 'points', self._receive, QoSProfile(depth=DEPTH, reliability=reliability),
-            event_callbacks=SubscriptionEventCallbacks(incompatible_qos=self._on_incompatible))
+        try:
+            return self._node.create_subscription(
+                PointCloud2, 'points', self._receive,
+                QoSProfile(depth=DEPTH, reliability=reliability),
+                event_callbacks=SubscriptionEventCallbacks(incompatible_qos=self._on_incompatible),
+                qos_overriding_options=QoSOverridingOptions(OVERRIDES))
+        except OVERRIDE_ERRORS as error:
+            raise InputError(f'{PREFIX}{self._node.resolve_topic_name("points")}: {error}'
+                             ) from error
 
     def _receive(self, message: PointCloud2) -> None:
         self._heard = self._heard_ever = True

@@ -1,32 +1,58 @@
-"""Warnings that tell everything and still leave the log readable at ten scans a second."""
+"""A log that tells everything and is still readable at ten scans a second."""
 import re
 import time
 from typing import Any
 
 PERIOD_S = 2.0
 REMEMBERED = 1000
+# a number, or a list of them
+NUMBERS = re.compile(r'\d+(?:[.,\s]*\d+)*')
 
 
 class SparingLog:
-    """Passes warnings on to a logger of rclpy, leaving out repetitions."""
+    """Passes texts on to a logger of rclpy, leaving out repetitions."""
 
     def __init__(self, logger: Any) -> None:
         self._logger = logger
         self._last: dict[str, float] = {}
+        self._trouble = ''
+
+    def note(self, text: str) -> None:
+        """Inform, unless the text is empty or was passed on before."""
+        if text and self._is_due(text, float('inf')):
+            self._logger.info(text)
 
     def once(self, text: str) -> None:
         """Warn unless the same text was passed on before."""
-        self._warn(text, text, float('inf'))
+        if self._is_due(text, float('inf')):
+            self._logger.warning(text)
 
-    def seldom(self, text: str) -> None:
-        """Warn unless a text that differs only in its numbers was passed on just before."""
-        self._warn(text, re.sub(r'\d+', '#', text), PERIOD_S)
+    def trouble(self, text: str, where: str) -> None:
+        """Warn when trouble begins, changes or, with an empty text, ends.
 
-    def _warn(self, text: str, key: str, period_s: float) -> None:
+        What differs only in its numbers is the same trouble; trouble that comes and goes is told
+        again after `PERIOD_S`.
+
+        Parameters
+        ----------
+        text : str
+        where : str
+            Goes before the text; it is no part of it.
+        """
+        kind = NUMBERS.sub('#', text)
+        if kind == self._trouble:
+            return
+        self._trouble = kind
+        if not text:
+            text = 'all is well again'
+        if self._is_due(f'trouble: {kind}', PERIOD_S):
+            self._logger.warning(f'{where}: {text}')
+
+    def _is_due(self, key: str, period_s: float) -> bool:
         now = time.monotonic()
         if now - self._last.get(key, float('-inf')) < period_s:
-            return
+            return False
         if len(self._last) >= REMEMBERED:
             self._last.clear()
         self._last[key] = now
-        self._logger.warning(text)
+        return True

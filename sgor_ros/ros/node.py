@@ -1,181 +1,72 @@
-"""`sgor_node`: labelled clouds in, poses out. It converts, calls the tracker and publishes."""
-import signal
+"""The process of `sgor_node`: how it starts, and how it ends.
+
+Exit codes: 0 after SIGINT or SIGTERM, at any moment; 2 where it cannot start as it was told to;
+1 with a traceback where the program is wrong.
+"""
+import os
 import sys
-import threading
-import time
+from typing import TYPE_CHECKING
 
-from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import PoseStamped
-from nav_msgs.msg import Odometry
-import rclpy
-from rclpy.executors import ExternalShutdownException
-from rclpy.node import Node
-from sensor_msgs.msg import PointCloud2
-from std_srvs.srv import Trigger
-from visualization_msgs.msg import MarkerArray
+from . import signals
 
-from ..core.common.settings import InputError
-from ..core.warmup import warm_up
-from ..io import messages
-from ..io.pointcloud2 import decode
-from ..tracker import TrackedScan
-from ..tracker import Tracker
-from . import status
-from .clouds import Clouds
-from .log import SparingLog
-from .parameters import NodeParameters
-from .slot import NewestSlot
-from .tf import TransformPublisher
-from .types import ros_type
+if TYPE_CHECKING:
+    from .sgor_node import SgorNode
 
-# before this, loading is nothing to talk about
-COMPILING_S = 1.0
-
-
-class SgorNode(Node):
-    """One thread receives (the executor's), one works; between them a slot for the newest scan."""
-
-    def __init__(self) -> None:
-        super().__init__('sgor_node')
-        self._settings = NodeParameters(self)
-        self._config = self._settings.node_config
-        self._tracker = Tracker(*self._settings.live)
-        self._pose = self.create_publisher(PoseStamped, 'pose', 10)
-        self._odometry = self.create_publisher(Odometry, 'odometry', 10)
-        self._markers = self.create_publisher(MarkerArray, 'correspondences', 1)
-        self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
-        self._tf = TransformPublisher(self) if self._config.publish_tf else None
-        self.create_service(Trigger, 'reset', self._on_reset)
-        self._reset_wanted = threading.Event()
-        self._slot: NewestSlot[tuple[PointCloud2, float]] = NewestSlot()
-        self._processed = 0
-        self._failed = 0
-        self._log = SparingLog(self.get_logger())
-        self._worker = threading.Thread(target=self._work, name='sgor worker')
-        self.crash: Exception | None = None
-
-    def start(self) -> None:
-        """Begin to work; clouds are subscribed to once everything is compiled."""
-        self._worker.start()
-
-    def stop(self) -> None:
-        """Let the worker finish its scan, and wait for it."""
-        self._slot.close()
-        if self._worker.is_alive():
-            self._worker.join()
-
-    def counts(self) -> status.Counts:
-        """Return what became of the scans so far."""
-        return status.Counts(self._slot.received, self._processed, self._slot.replaced,
-                             self._failed)
-
-    def _on_reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        self._reset_wanted.set()
-        response.success = True
-        response.message = 'the next scan starts a new track'
-        return response
-
-    def _work(self) -> None:
-        """Run on the worker's thread until the slot is closed."""
-        try:
-            self._warm_up()
-            self._clouds = Clouds(self, self._config.reliability,
-                                  lambda cloud: self._slot.put((cloud, time.monotonic())))
-            while (item := self._slot.take()) is not None:
-                self._process(*item)
-        except Exception as error:
-            # whatever was under way when the context went down is of no interest
-            if self.context.ok():
-                self.crash = error
-                self.context.try_shutdown()
-
-    def _warm_up(self) -> None:
-        log = self.get_logger()
-        said = threading.Timer(COMPILING_S, log.info, [
-            'compiling; once, the result is kept for the next start'])
-        begin = time.monotonic()
-        said.start()
-        try:
-            warm_up(self._settings.live[0])
-        finally:
-            said.cancel()
-            said.join()
-        log.info(f'ready after {time.monotonic() - begin:.1f} s, waiting for clouds on '
-                 f'{self.resolve_topic_name("points")}')
-
-    def _process(self, cloud: PointCloud2, received: float) -> None:
-        begin = time.monotonic()
-        stamp_ns = messages.stamp_ns_of(cloud.header)
-        frame = self._config.sensor_frame or cloud.header.frame_id
-        if not frame:
-            self._log.once('the clouds have no frame_id: set the parameter sensor_frame')
-        self._tracker.config, self._tracker.tracker_config = self._settings.live
-        if self._reset_wanted.is_set():
-            self._reset_wanted.clear()
-            self._tracker.reset()
-        try:
-            tracked = self._tracker.track(decode(cloud, self._config.label_field), stamp_ns)
-        except InputError as error:
-            self._failed += 1
-            level, message, values = status.ERROR, f'unusable cloud: {error}', {}
-        else:
-            self._publish(tracked, frame)
-            level, message = status.judged(tracked)
-            values = status.details(tracked)
-        if level == status.ERROR:
-            self._log.seldom(f'scan at {stamp_ns * 1e-9:.3f} s: {message}')
-        now = time.monotonic()
-        values |= {'seconds': f'{now - begin:.4f}', 'latency': f'{now - received:.4f}'}
-        self._diagnostics.publish(status.diagnostics(
-            self.get_fully_qualified_name(), frame, stamp_ns, level, message, self.counts(),
-            values))
-
-    def _publish(self, tracked: TrackedScan, frame: str) -> None:
-        """Send the pose, if there is one, then what only a display needs."""
-        odom = self._config.odom_frame
-        if tracked.success:
-            self._processed += 1
-            self._odometry.publish(messages.odometry(ros_type, tracked, odom, frame))
-            self._pose.publish(messages.pose_stamped(ros_type, tracked, odom))
-            if self._tf:
-                self._tf.publish(tracked, odom, frame)
-        else:
-            self._failed += 1
-        if self._markers.get_subscription_count():
-            self._markers.publish(messages.correspondence_markers(ros_type, tracked, odom))
-        for text in tracked.warnings:
-            self._log.once(text)
+# how long the executor waits before it looks for a signal
+PATIENCE_S = 0.1
 
 
 def main(args: list[str] | None = None) -> int:
-    """Run the node until it is interrupted; return the exit code of the process."""
+    """Run the node until a signal comes; return the exit code of the process."""
+    signals.end_at_once()
+    # late: this takes a second, in which signals must do already
+    import rclpy
+    from rclpy.signals import SignalHandlerOptions
+
+    from ..core.common.settings import InputError
+    from .sgor_node import SgorNode
+
+    flag = signals.SignalFlag()
     try:
-        rclpy.init(args=args)
+        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     except RuntimeError as error:
         # such as a parameter file that is missing or is no YAML
-        print(f'error: {error}', file=sys.stderr)
-        return 2
-    node = None
+        return _refuse(error)
     try:
-        node = SgorNode()
-        node.start()
-        rclpy.spin(node)
+        return _run(SgorNode(), flag)
     except InputError as error:
-        print(f'error: {error}', file=sys.stderr)
-        return 2
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
+        return _refuse(error)
     finally:
-        # a terminal and ros2 launch both send one; the first is enough
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
-        if node is not None:
-            node.stop()
+        signals.ignore()
         rclpy.try_shutdown()
-    assert node is not None
+
+
+def _run(node: 'SgorNode', flag: signals.SignalFlag) -> int:
+    from rclpy.executors import SingleThreadedExecutor
+
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    node.start()
+    try:
+        while not flag.raised and not node.crash:
+            executor.spin_once(PATIENCE_S)
+    finally:
+        ended = node.stop()
+        print(node.counts(), flush=True)
+        if not ended:
+            # it compiles, or its scan takes minutes: threads can't be stopped, processes can
+            sys.stderr.flush()
+            os._exit(0)
+        executor.shutdown()
+        node.destroy_node()
     if node.crash:
         raise node.crash
-    print(node.counts(), flush=True)
     return 0
+
+
+def _refuse(error: Exception) -> int:
+    print(f'error: {error}', file=sys.stderr)
+    return 2
 
 
 if __name__ == '__main__':

@@ -41,7 +41,10 @@ class NodeConfig(StreamConfig):
         'auto', 'QoS of the subscription; auto: reliable, which loses no large clouds, until a '
         'publisher turns up that is best effort only', choices=('auto', 'reliable', 'best_effort'))
     publish_tf: bool = setting(
-        False, 'Publish the transform from odom_frame to the sensor frame on /tf')
+        False, 'Publish the transform from odom_frame to base_frame, or to the sensor frame, on '
+        '/tf')
+    invert_tf: bool = setting(
+        False, 'Publish it as a transform to odom_frame: for a base that has a parent already')
 
 
 class NodeParameters:

@@ -10,20 +10,27 @@ from ..tracker import TrackedScan
 from .types import ros_type
 
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
+STALE = DiagnosticStatus.STALE
 
 
 @dataclass
 class Counts:
-    """Scans since the start: received = processed + failed + replaced + the one at work."""
+    """Scans since the start: received = processed + failed + replaced + the one at work.
+
+    Before those, `missed` never came, by their stamps, and `paused` came while the node paused.
+    """
 
     received: int = 0
     processed: int = 0
     replaced: int = 0
     failed: int = 0
+    missed: int = 0
+    paused: int = 0
 
     def __str__(self) -> str:
-        """Return the counts in one line."""
-        return ', '.join(f'{name} {count}' for name, count in vars(self).items())
+        """Return the counts in one line, without what never happened before the count."""
+        return ', '.join(f'{name} {count}' for name, count in vars(self).items()
+                         if count or name not in ('missed', 'paused'))
 
 
 def diagnostics(name: str, frame: str, stamp_ns: int, level: bytes, message: str, counts: Counts,
@@ -37,10 +44,19 @@ def diagnostics(name: str, frame: str, stamp_ns: int, level: bytes, message: str
             values=[KeyValue(key=key, value=value) for key, value in pairs.items()])])
 
 
-def judged(tracked: TrackedScan) -> tuple[bytes, str]:
-    """Return the level of a scan and why."""
+def judged(tracked: TrackedScan, unplaced: str) -> tuple[bytes, str]:
+    """Return the level of a scan and why.
+
+    Parameters
+    ----------
+    tracked : TrackedScan
+    unplaced : str
+        Why its pose could not be published; empty where nothing was in the way.
+    """
     if not tracked.success:
-        return ERROR, f'registration failed: {tracked.reason}'
+        return ERROR, '; '.join((f'registration failed: {tracked.reason}', *tracked.warnings))
+    if unplaced:
+        return WARN, '; '.join((f'nothing is published: {unplaced}', *tracked.warnings))
     if tracked.warnings:
         return WARN, '; '.join(tracked.warnings)
     return OK, 'first scan of a track' if tracked.restarted else 'registered'

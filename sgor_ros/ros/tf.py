@@ -1,34 +1,39 @@
 """The transform of the odometry on /tf, for those who want it."""
 from rclpy.node import Node
 from rclpy.publisher import Publisher
-from rclpy.qos import QoSProfile
 
+from ..core.common import se3
 from ..core.common.settings import InputError
 from ..io import messages
 from ..tracker import TrackedScan
+from .publishers import publisher
 from .types import ros_type
 
 
 class TransformPublisher:
-    """What tf2's broadcaster is: a publisher of tf2_msgs/msg/TFMessage, with its QoS."""
+    """What tf2's broadcaster is: a publisher of tf2_msgs/msg/TFMessage, with its QoS.
 
-    def __init__(self, node: Node) -> None:
+    Parameters
+    ----------
+    node : Node
+    inverted : bool
+        Whether the odom frame is the child: for a base that has a parent already.
+    """
+
+    def __init__(self, node: Node, inverted: bool) -> None:
         try:
-            message = ros_type('tf2_msgs/msg/TFMessage')
+            self._message = ros_type('tf2_msgs/msg/TFMessage')
         except ModuleNotFoundError as error:
             raise InputError('publish_tf = True: the package tf2_msgs is not installed; '
                              'apt install ros-jazzy-tf2-msgs') from error
-        self._publisher: Publisher = node.create_publisher(message, '/tf', QoSProfile(depth=100))
+        self._inverted = inverted
+        self._publisher: Publisher = publisher(node, self._message, '/tf', 100)
 
-    def publish(self, tracked: TrackedScan, odom_frame: str, sensor_frame: str) -> None:
-        """Send the pose of a scan as the transform from `odom_frame` to `sensor_frame`."""
+    def publish(self, tracked: TrackedScan, odom_frame: str, frame: str) -> None:
+        """Send the pose of a scan as the transform between `odom_frame` and `frame`."""
         assert tracked.T_odom_sensor is not None
-        pose = messages.pose(ros_type, tracked.T_odom_sensor)
-        at = pose.position
-        transform = ros_type('geometry_msgs/msg/Transform')(
-            translation=ros_type('geometry_msgs/msg/Vector3')(x=at.x, y=at.y, z=at.z),
-            rotation=pose.orientation)
-        stamped = ros_type('geometry_msgs/msg/TransformStamped')(
-            header=messages.header(ros_type, tracked.stamp_ns, odom_frame),
-            child_frame_id=sensor_frame, transform=transform)
-        self._publisher.publish(ros_type('tf2_msgs/msg/TFMessage')(transforms=[stamped]))
+        T, parent, child = tracked.T_odom_sensor, odom_frame, frame
+        if self._inverted:
+            T, parent, child = se3.inverse(T), frame, odom_frame
+        self._publisher.publish(self._message(transforms=[messages.transform_stamped(
+            ros_type, T, tracked.stamp_ns, parent, child)]))

@@ -26,15 +26,22 @@ from .labels import label_convention
 from .labels import LabelConvention
 from .labels import UNLABELLED
 from .neighbours import radius_neighbours
+from .scale import scale_of
+from .scale import STREET_VOXEL
+from .scan import Given
 from .scan import PreparedScan
 from .scan import SemanticScan
+from .voxels import thin
 from .voxels import voxel_grid
 from .voxels import VoxelCloud
 
+# ids to name in a warning
+UNKNOWN_TOLD = 5
+
 
 def preprocess(scan: SemanticScan, config: SgorConfig | None = None, *,
-               keypoints: ArrayLike | None = None,
-               descriptors: ArrayLike | None = None) -> PreparedScan:
+               keypoints: ArrayLike | None = None, descriptors: ArrayLike | None = None,
+               scale_before: float | None = None) -> PreparedScan:
     """Segment the ground and describe the rest of one scan, once for all its registrations.
 
     Parameters
@@ -46,6 +53,8 @@ def preprocess(scan: SemanticScan, config: SgorConfig | None = None, *,
         Keypoints of the caller, metres, in place of the voxels.
     descriptors : (V, D) array, optional
         Their learned features, such as FCGF; both scans need the same D.
+    scale_before : float, optional
+        The scale of the scan before, to keep where it fits nearly as well.
 
     Returns
     -------
@@ -58,16 +67,37 @@ def preprocess(scan: SemanticScan, config: SgorConfig | None = None, *,
     """
     config = config or SgorConfig()
     with cores(config.threads):
-        return _prepare(scan, config, keypoints, descriptors)
+        given = None if keypoints is None and descriptors is None else (keypoints, descriptors)
+        return _prepare(scan, config, given, scale_before)
 
 
-def _prepare(scan: SemanticScan, config: SgorConfig, keypoints: ArrayLike | None,
-             descriptors: ArrayLike | None) -> PreparedScan:
-    convention = label_convention(config.label_convention)
+def at_scale(prepared: PreparedScan, scale: float) -> PreparedScan:
+    """Prepare a scan again where its scale is another."""
+    if prepared.scale == scale:
+        return prepared
+    again = _prepare(prepared.scan, prepared.config.replace(scale=scale), prepared.given, None)
+    return replace(again, config=prepared.config)
+
+
+def _prepare(scan: SemanticScan, asked: SgorConfig, given: Given | None,
+             scale_before: float | None) -> PreparedScan:
+    convention = label_convention(asked.label_convention)
     clock = Stopwatch()
     with clock('voxel grid'):
+        scale, config = asked.scale or 1.0, asked.scaled(asked.scale or 1.0)
         points, labels, warnings = _usable(scan, convention, config)
         cloud = voxel_grid(points, labels, config.voxel_size)
+        if asked.scale == 0:
+            even = cloud if config.voxel_size == STREET_VOXEL else voxel_grid(
+                points, labels, STREET_VOXEL)
+            scale = scale_of(even.points, scale_before)
+            if scale != 1:
+                config = asked.scaled(scale)
+                points, labels, warnings = _usable(scan, convention, config)
+                cloud = voxel_grid(points, labels, config.voxel_size)
+        if len(cloud.points) > config.max_voxels:
+            warnings.append(f'{len(cloud.points)} voxels thinned to {config.max_voxels}')
+            cloud = cloud[thin(len(cloud.points), config.max_voxels)]
     with clock('surface'):
         fixed = config.moving_vote | ~np.isin(cloud.labels, list(convention.movable))
         local = surface(cloud.points[fixed], config.threads) if config.local_refinement else None
@@ -80,10 +110,10 @@ def _prepare(scan: SemanticScan, config: SgorConfig, keypoints: ArrayLike | None
         regional = regional_labels(cloud, neighbours, config.vote_radius)
         keep = ~np.isin(regional, _unmatched_classes(convention, config))
         cloud, regional = cloud[keep], regional[keep]
-    if keypoints is None and descriptors is None:
+    if given is None:
         features, directions = _describe(cloud, regional, config, clock)
     else:
-        features = _given(keypoints, descriptors, cloud, regional, config)
+        features = _given(*given, cloud, regional, config)
         directions = normals(features.points, radius_neighbours(
             features.points, config.normal_radius), config.normal_radius)
     if ground is None:
@@ -96,8 +126,8 @@ def _prepare(scan: SemanticScan, config: SgorConfig, keypoints: ArrayLike | None
     with clock('view'):
         sight = view(points, features, directions, None if ground is None else ground.normal,
                      config.evidence_reach)
-    return PreparedScan(scan, config, features, ground, sight, local, tuple(warnings),
-                        clock.seconds)
+    return PreparedScan(scan, asked, scale, features, ground, sight, local, tuple(warnings),
+                        clock.seconds, given)
 
 
 def _usable(scan: SemanticScan, convention: LabelConvention, config: SgorConfig
@@ -112,9 +142,25 @@ def _usable(scan: SemanticScan, convention: LabelConvention, config: SgorConfig
     keep &= fixed
     warnings = []
     if unknown:
-        warnings.append(f'label ids {unknown} are not in convention {convention.name}: '
+        warnings.append(_unknown_in_words(scan.labels & convention.mask, unknown, convention.name))
+    labels = labels[keep]
+    if labels.any() and (labels == labels[0]).all():
+        warnings.append(f'every point is {convention.names.get(int(labels[0]), labels[0])}: '
                         'treated as unlabelled')
-    return np.compress(keep, scan.points, axis=0), labels[keep], warnings
+        labels[:] = UNLABELLED
+    return np.compress(keep, scan.points, axis=0), labels, warnings
+
+
+def _unknown_in_words(ids: NDArray[np.int64], unknown: list[int], convention: str) -> str:
+    """Return a warning about ids that a convention does not list; a wrong field has thousands."""
+    told = ', '.join(str(i) for i in unknown[:UNKNOWN_TOLD])
+    if len(unknown) > UNKNOWN_TOLD:
+        told += f', ... {len(unknown)} in all'
+    share = float(np.isin(ids, unknown).mean())
+    text = f'label ids [{told}] are not in convention {convention}: treated as unlabelled'
+    if share <= 0.5:
+        return text
+    return f'{text}; these are {share:.0%} of the points: is label_convention right?'
 
 
 def _unmatched_classes(convention: LabelConvention, config: SgorConfig) -> list[int]:

@@ -22,9 +22,9 @@ WEAK = 0.1
 LEVEL = 0.3
 """Share of the information that a ground plane seen by both scans adds to height, roll and pitch:
 the keypoints are none of the ground."""
-PUSHES = (2.0, 4.0, 8.0, 16.0)
+PUSH, PUSHES = 2.0, (4.0, 16.0)
 """How far a weak direction is tried, in reaches of the views: the first decides, the others tell
-how far."""
+how far it goes on, and where to."""
 
 CROOKED = 0.01
 """What is slid along is straight to this share of the way: so far off may the rest be."""
@@ -41,10 +41,13 @@ class Slide:
         metre at the typical point.
     sigma : float
         How far, metres: what is really unknown.
+    lever : float
+        Typical distance of the points from the sensor, metres.
     """
 
     twist: NDArray[np.float64]
     sigma: float
+    lever: float
 
 
 def information(source: View, target: View, T_target_source: NDArray[np.float64]
@@ -75,13 +78,13 @@ def information(source: View, target: View, T_target_source: NDArray[np.float64]
 
 
 def weak_directions(source: View, target: View, T_target_source: NDArray[np.float64]
-                    ) -> NDArray[np.float64]:
-    """Return the twists (K, 6) of one metre along which the surfaces hold little."""
+                    ) -> tuple[NDArray[np.float64], float]:
+    """Return twists (K, 6) of one metre along which the surfaces hold little, and the lever."""
     matrix, lever = information(source, target, T_target_source)
     values, vectors = np.linalg.eigh(matrix)
     twists = vectors[:, values < WEAK].T
     twists[:, 3:] /= lever
-    return twists
+    return twists, lever
 
 
 def is_shift(twist: NDArray[np.float64]) -> bool:
@@ -111,19 +114,12 @@ def without_slides(T: NDArray[np.float64], other: NDArray[np.float64], slides: t
     return other
 
 
-def along(T_one: NDArray[np.float64], T_other: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the twist of one metre that leads from one placement to another, (6,)."""
-    gap = np.concatenate((T_other[:3, 3] - T_one[:3, 3],
-                          Rotation.from_matrix(T_other[:3, :3] @ T_one[:3, :3].T).as_rotvec()))
-    twist: NDArray[np.float64] = gap / np.linalg.norm(gap[:3])
-    return twist
-
-
 def inflate(covariance: NDArray[np.float64], slides: tuple[Slide, ...]) -> NDArray[np.float64]:
     """Add what is unknown along the slides to a (6, 6) covariance."""
     for slide in slides:
         covariance = covariance + slide.sigma**2 * np.outer(slide.twist, slide.twist)
-        covariance[:3, :3] += (CROOKED * slide.sigma)**2 * np.eye(3)
+        aside = CROOKED * slide.sigma * np.repeat((1.0, 1.0 / slide.lever), 3)
+        covariance = covariance + np.diag(aside**2)
     return covariance
 
 

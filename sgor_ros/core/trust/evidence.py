@@ -165,7 +165,7 @@ def _on_surface(x, y, z, label, others, normals, other_labels, cell,  # type: ig
 @numba.njit(cache=True, nogil=True, inline='always')
 def alike(one, other):  # type: ignore[no-untyped-def]
     """Return whether two regional labels may be of one thing; the unlabelled may be anything."""
-    return one == other or one * other == UNLABELLED
+    return one == other or min(one, other) == UNLABELLED
 
 
 @numba.njit(cache=True, nogil=True, inline='always')

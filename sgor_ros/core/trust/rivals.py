@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from ..common import se3
-from .degeneracy import along
 from .degeneracy import is_shift
+from .degeneracy import PUSH
 from .degeneracy import pushed
 from .degeneracy import PUSHES
 from .degeneracy import Slide
@@ -97,8 +97,8 @@ def contest(source: View, target: View, T_target_source: NDArray[np.float64],
         Whether a rival that wins is to face its own rivals too.
     """
     T = icp(source, target, T_target_source[None], WIDE, NARROW)[0]
-    weak = weak_directions(source, target, T)
-    pushes = PUSHES[0] * target.reach * np.vstack((weak, -weak))
+    weak, lever = weak_directions(source, target, T)
+    pushes = PUSH * target.reach * np.vstack((weak, -weak))
     others = icp(source, target, np.concatenate((
         _apart(hypotheses, T[None], target, HYPOTHESES),
         correlated(source, target, T, radius))), WIDE, 0)
@@ -114,7 +114,7 @@ def contest(source: View, target: View, T_target_source: NDArray[np.float64],
         return contest(source, target, fitted[best], hypotheses, radius, again=False)
     standing = differ(fitted[best], fitted, target) & ~ruled_out(many[best], many)
     slides = tuple(
-        _measured(source, target, fitted[best], many[best], twist, radius)
+        _measured(source, target, fitted[best], many[best], twist, lever, radius)
         for k, twist in enumerate(weak)
         if _slides(fitted[[0, 1 + k, 1 + k + len(weak)]], standing[[1 + k, 1 + k + len(weak)]],
                    pushes[k]))
@@ -159,7 +159,7 @@ def _along_ridges(source: View, target: View, T: NDArray[np.float64],
     found = _tuned(source, target, np.concatenate(ridges), weak)
     far = np.linalg.norm(found[:, :3, 3] - T[:3, 3], axis=1)
     # nearer to the answer, the pushes decide
-    return found[differ(T, found, target, PUSHES[0]) & (far < radius)]
+    return found[differ(T, found, target, PUSH) & (far < radius)]
 
 
 def _score(outcomes: NDArray[np.int8]) -> NDArray[np.float64]:
@@ -191,19 +191,24 @@ def _tuned(source: View, target: View, placements: NDArray[np.float64],
 
 
 def _measured(source: View, target: View, T: NDArray[np.float64], outcomes: NDArray[np.int8],
-              twist: NDArray[np.float64], radius: float) -> Slide:
-    """Find out how far the clouds can be pushed along a free direction."""
-    lengths = target.reach * np.array(PUSHES[1:])
-    tried = icp(source, target, pushed(T, np.outer(np.r_[lengths, -lengths], twist)), WIDE, NARROW)
+              twist: NDArray[np.float64], lever: float, radius: float) -> Slide:
+    """Find out how far, and where to, the clouds can be pushed along a free direction."""
+    ways = target.reach * np.array([way for length in PUSHES for way in (length, -length)])
+    tried = icp(source, target, pushed(T, np.outer(ways, twist)), WIDE, NARROW)
     said = testify(source, target, tried, MANY)
-    standing = (differ(T, tried, target) & ~ruled_out(outcomes, said)).reshape(2, -1)
-    if is_shift(twist) and standing.any():
-        # the way between those that stand is straighter than the eigenvector
-        ends = tried[np.flatnonzero(standing)[[0, -1]]]
-        twist = along(*(ends if standing.sum() > 1 else (T, ends[0])))
-    far = standing.any(axis=0)
+    standing = differ(T, tried, target) & ~ruled_out(outcomes, said)
+    if not standing[:2].any():
+        return Slide(twist, PUSHES[0] * target.reach, lever)
+    if is_shift(twist):
+        # the line through the places where it stands is straighter than the eigenvector
+        places = np.vstack((T[:3, 3], tried[standing, :3, 3]))
+        line = np.linalg.svd(places - places.mean(axis=0))[2][0]
+        if target.level:
+            # nor does it leave the ground, of which the keypoints are none
+            line -= (line @ target.axes[2]) * target.axes[2]
+        twist = np.concatenate((line / np.linalg.norm(line), np.zeros(3)))
     # with no end in sight, anywhere within the radius is as likely
-    return Slide(twist, radius / np.sqrt(3) if far.all() else float(lengths[int(np.argmin(far))]))
+    return Slide(twist, radius / np.sqrt(3), lever)
 
 
 def ruled_out(answer: NDArray[np.int8], rivals: NDArray[np.int8]) -> NDArray[np.bool_]:
@@ -218,9 +223,10 @@ def ruled_out(answer: NDArray[np.int8], rivals: NDArray[np.int8]) -> NDArray[np.
     """
     support = (rivals == AGREE).sum(axis=1)
     against, back = _exclusive(answer, rivals)
-    clear = ((against - back >= max(CLEAR_COUNT, CLEAR_SHARE * len(answer)))
-             & (against >= CLEAR_RATIO * back))
-    return clear | (support < LEAST_SUPPORT * (answer == AGREE).sum())
+    out: NDArray[np.bool_] = against - back >= max(CLEAR_COUNT, CLEAR_SHARE * len(answer))
+    out &= against >= CLEAR_RATIO * back
+    out |= support < LEAST_SUPPORT * (answer == AGREE).sum()
+    return out
 
 
 def differ(T: NDArray[np.float64], others: NDArray[np.float64], target: View,
@@ -230,12 +236,14 @@ def differ(T: NDArray[np.float64], others: NDArray[np.float64], target: View,
     On level ground only shifts and turns in its plane count: the ground holds the rest, and the
     keypoints are none of it.
     """
-    turned = Rotation.from_matrix(others[:, :3, :3] @ T[:3, :3].T).as_rotvec()
+    turned: NDArray[np.float64] = Rotation.from_matrix(
+        others[:, :3, :3] @ T[:3, :3].T).as_rotvec()
     shifted = others[:, :3, 3] - T[:3, 3]
     if target.level:
         turned, shifted = turned @ target.axes[2:].T, shifted @ target.axes[:2].T
-    return np.asarray((np.linalg.norm(shifted, axis=1) > reaches * target.reach)
-                      | (np.linalg.norm(turned, axis=1) > SAME_ANGLE), np.bool_)
+    apart: NDArray[np.bool_] = np.linalg.norm(shifted, axis=1) > reaches * target.reach
+    apart |= np.linalg.norm(turned, axis=1) > SAME_ANGLE
+    return apart
 
 
 def correlated(source: View, target: View, T_target_source: NDArray[np.float64], radius: float

@@ -1,0 +1,89 @@
+"""What others may tell the node: reset, pause, resume, set_pose."""
+import threading
+
+from geometry_msgs.msg import PoseWithCovarianceStamped
+import numpy as np
+from numpy.typing import NDArray
+from rclpy.node import Node
+from std_srvs.srv import Trigger
+
+from ..io.frames import frame_id
+from ..io.messages import matrix_of
+
+Array = NDArray[np.float64]
+# a quaternion of this length or more is taken for a rotation
+SHORTEST_QUATERNION = 0.5
+
+
+class Commands:
+    """Takes commands on the executor's thread; the worker asks for them before each scan.
+
+    Attributes
+    ----------
+    paused : bool
+    """
+
+    def __init__(self, node: Node, odom_frame: str) -> None:
+        self._log = node.get_logger()
+        self._odom_frame = odom_frame
+        self._lock = threading.Lock()
+        self._reset = False
+        self._start: tuple[Array, Array] | None = None
+        self.paused = False
+        node.create_service(Trigger, 'reset', self._on_reset)
+        node.create_service(Trigger, 'pause', self._on_pause)
+        node.create_service(Trigger, 'resume', self._on_resume)
+        node.create_subscription(PoseWithCovarianceStamped, 'set_pose', self._on_set_pose, 1)
+
+    def take(self) -> tuple[bool, tuple[Array, Array] | None]:
+        """Return what was asked for since the last call.
+
+        Returns
+        -------
+        reset : bool
+            Whether a new track is wanted.
+        start : ((4, 4) array, (6, 6) array) or None
+            Pose and covariance that it begins at, where they were given.
+        """
+        with self._lock:
+            wanted = self._reset, self._start
+            self._reset, self._start = False, None
+            return wanted
+
+    def _on_reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        with self._lock:
+            self._reset = True
+        return _done(response, 'the next scan starts a new track')
+
+    def _on_pause(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        self.paused = True
+        return _done(response, 'clouds are left out until resume')
+
+    def _on_resume(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        self.paused = False
+        return _done(response, 'the next scan goes on from the last one before the pause')
+
+    def _on_set_pose(self, message: PoseWithCovarianceStamped) -> None:
+        """Begin a new track there with the next scan."""
+        frame = frame_id(message.header.frame_id)
+        q = message.pose.pose.orientation
+        x = message.pose.pose.position
+        numbers = np.array([x.x, x.y, x.z, q.x, q.y, q.z, q.w])
+        covariance = np.array(message.pose.covariance).reshape(6, 6)
+        if frame not in ('', self._odom_frame):
+            self._log.warning(f'set_pose: in the frame {frame}, not in {self._odom_frame}: '
+                              'ignored')
+        elif (not np.isfinite(numbers).all() or not np.isfinite(covariance).all()
+              or np.linalg.norm(numbers[3:]) < SHORTEST_QUATERNION):
+            self._log.warning('set_pose: not a finite pose with a rotation: ignored')
+        else:
+            with self._lock:
+                self._reset = True
+                self._start = matrix_of(message.pose.pose), covariance
+            self._log.info('set_pose: the next scan starts a new track there')
+
+
+def _done(response: Trigger.Response, message: str) -> Trigger.Response:
+    response.success = True
+    response.message = message
+    return response
