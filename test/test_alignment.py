@@ -38,10 +38,10 @@ def noise(found):
     return found.covariance - found.systematic @ found.systematic.T
 
 
-@pytest.mark.parametrize('offset', [
-    motion(0.1, -0.1, 0.05, 0.3), motion(-0.15, 0.1, 0.0, -0.4, 0.2)])
+@pytest.mark.parametrize('offset', [motion(0.1, -0.1, 0.05, 0.3),
+                                    motion(-0.15, 0.1, 0.0, -0.4, 0.2)])
 def test_a_small_motion_is_found(clouds, offset):
-    """From where the rivals end, some decimetres and tenths of a degree off, to centimetres."""
+    """From some decimetres and tenths of a degree off to centimetres."""
     source, target, truth = clouds
     found = aligned(source, target, truth @ offset)
     metres, degrees = errors(found.T_target_source, truth)
