@@ -56,6 +56,8 @@ TUNING = (-0.5, -0.25, 0.25, 0.5)
 STAYS = 0.8
 """A direction is free where a push along it is kept to this share: elsewhere the clouds slide
 back."""
+LEVEL = np.cos(np.radians(10.0))
+"""Least cosine of the ground normals under a rival: slopes and their estimates included."""
 SAME_ANGLE = np.radians(5.0)
 """With the reach, the least difference of two placements."""
 
@@ -104,6 +106,7 @@ def contest(source: View, target: View, T_target_source: NDArray[np.float64],
         correlated(source, target, T, radius))), WIDE, 0)
     if len(weak):
         others = _along_ridges(source, target, T, others, weak, radius)
+    others = others[_keeps_level(source, target, others)]
     few = testify(source, target, np.concatenate((T[None], others)), FEW)
     rivals = others[~ruled_out(few[0], few[1:])]
     fitted = np.concatenate((T[None], icp(source, target, pushed(T, pushes), WIDE, NARROW),
@@ -120,6 +123,15 @@ def contest(source: View, target: View, T_target_source: NDArray[np.float64],
                    pushes[k]))
     standing[1:1 + len(pushes)] = False    # these were asked for the slides
     return _remaining(fitted, many, best, standing, slides, target)
+
+
+def _keeps_level(source: View, target: View, placements: NDArray[np.float64]
+                 ) -> NDArray[np.bool_]:
+    """Return which of (K, 4, 4) placements keep the ground level, as far as it is known, (K,)."""
+    if not (source.level and target.level):
+        return np.ones(len(placements), np.bool_)
+    level: NDArray[np.bool_] = (placements[:, :3, :3] @ source.axes[2]) @ target.axes[2] > LEVEL
+    return level
 
 
 def _slides(placements: NDArray[np.float64], standing: NDArray[np.bool_],
