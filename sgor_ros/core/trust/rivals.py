@@ -42,6 +42,8 @@ HYPOTHESES = 6
 """Placements taken from the hypotheses of the solver."""
 WIDE, NARROW = 3, 4
 """Rounds of ICP for each rival."""
+LATE = 10
+"""Rounds of either kind for the few that nothing has ruled out by then."""
 LEAST_SUPPORT = 0.45
 """A rival with less of the agreement of the answer explains too little to be one."""
 FEW, MANY = 250, 1000
@@ -116,6 +118,13 @@ def contest(source: View, target: View, T_target_source: NDArray[np.float64],
     if best > 0 and again:
         return contest(source, target, fitted[best], hypotheses, radius, again=False)
     standing = differ(fitted[best], fitted, target) & ~ruled_out(many[best], many)
+    late = standing.copy()
+    late[:1 + len(pushes)] = False
+    if late.any():
+        # some are only on their way to the answer
+        fitted[late] = icp(source, target, fitted[late], LATE, LATE)
+        many[late] = testify(source, target, fitted[late], MANY)
+        standing = differ(fitted[best], fitted, target) & ~ruled_out(many[best], many)
     slides = tuple(
         _measured(source, target, fitted[best], many[best], twist, lever, radius)
         for k, twist in enumerate(weak)
