@@ -85,23 +85,25 @@ def _register(source: SemanticScan | PreparedScan, target: SemanticScan | Prepar
 
 
 def _attempts(config: SgorConfig, *, labelled: bool, level: bool) -> Iterator[SgorConfig]:
-    """Yield the settings of a quick attempt with few keypoints, of all, and without labels.
+    """Yield the settings of each attempt; the first that the clouds believe ends them.
 
-    Where the ground planes may be of walls or tables, each again with whatever is level.
+    A quick one with few keypoints; one with all; one that trusts less: without labels, or, where
+    there are none, without what stands around, which from afar looks another. Where the ground
+    planes may be of walls or tables, the quick one and all once more with whatever is level.
     """
-    if not labelled:
-        config = config.replace(semantics='none')
+    config = config if labelled else config.replace(semantics='none')
     tilted = config.replace(ground_check=False, height_gate=0.0, context_weight=0.0)
-    ways = (config,) if level or config == tilted else (config, tilted)
     if 0 < config.quick_keypoints < config.max_correspondences:
-        for way in ways:
+        for way in (config,) if level else (config, tilted):
             yield way.replace(max_correspondences=config.quick_keypoints,
                               groups=min(config.groups, config.quick_groups),
                               group_size=max(config.quick_keypoints // 8, config.group_keep + 1))
-    yield from ways
-    # without labels it would be the same attempt again
-    if config.unlabelled_attempt and config.semantics != 'none':
-        yield config.replace(semantics='none')
+    yield config
+    less = (config.replace(semantics='none') if labelled else config.replace(context_weight=0.0))
+    if config.unlabelled_attempt and less != config:    # which would be the same again
+        yield less
+    if not level and tilted not in (config, less):
+        yield tilted
 
 
 def _globally(source: PreparedScan, target: PreparedScan, config: SgorConfig,
