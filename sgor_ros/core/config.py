@@ -70,8 +70,8 @@ class SgorConfig(Settings):
     match_within_labels: bool = setting(
         True, 'Match only points of the same regional label (beyond the paper)')
     unlabelled_attempt: bool = setting(
-        True, 'Match what is refused once more by geometry alone: labels may be wrong '
-        '(beyond the paper)')
+        True, 'Match what is refused once more by geometry alone, or, where there are no labels, '
+        'without the context (beyond the paper)')
     height_gate: float = setting(
         0.5, 'Match only points whose heights over the ground differ by less; 0: off '
         '(beyond the paper)', 'm', minimum=0.0, maximum=20.0)

@@ -89,21 +89,25 @@ def _attempts(config: SgorConfig, *, labelled: bool, level: bool) -> Iterator[Sg
 
     A quick one with few keypoints; one with all; one that trusts less: without labels, or, where
     there are none, without what stands around, which from afar looks another. Where the ground
-    planes may be of walls or tables, the quick one and all once more with whatever is level.
+    planes may be of walls or tables, nothing stands around, and whatever is level is tried too.
     """
-    config = config if labelled else config.replace(semantics='none')
-    tilted = config.replace(ground_check=False, height_gate=0.0, context_weight=0.0)
+    if not labelled:
+        config = config.replace(semantics='none')
+        less = config.replace(context_weight=0.0)
+    else:
+        less = config.replace(semantics='none')
+    ways = (config,) if level else (
+        config.replace(context_weight=0.0),
+        config.replace(context_weight=0.0, ground_check=False, height_gate=0.0))
     if 0 < config.quick_keypoints < config.max_correspondences:
-        for way in (config,) if level else (config, tilted):
+        for way in ways:
             yield way.replace(max_correspondences=config.quick_keypoints,
                               groups=min(config.groups, config.quick_groups),
                               group_size=max(config.quick_keypoints // 8, config.group_keep + 1))
-    yield config
-    less = (config.replace(semantics='none') if labelled else config.replace(context_weight=0.0))
-    if config.unlabelled_attempt and less != config:    # which would be the same again
+    yield ways[0]
+    if config.unlabelled_attempt and less not in (config, *ways):    # or the same once more
         yield less
-    if not level and tilted not in (config, less):
-        yield tilted
+    yield from ways[1:]
 
 
 def _globally(source: PreparedScan, target: PreparedScan, config: SgorConfig,
