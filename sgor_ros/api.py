@@ -7,10 +7,11 @@ from .core.result import Registration
 from .core.scan.preprocessing import preprocess
 from .core.scan.scan import PreparedScan
 from .core.scan.scan import SemanticScan
+from .tracker import State
 from .tracker import TrackedScan
 from .tracker import Tracker
 from .tracker import TrackerConfig
 
 __all__ = ['InputError', 'PreparedScan', 'Registration', 'SemanticScan', 'SgorConfig',
-           'TrackedScan', 'Tracker', 'TrackerConfig', 'preprocess', 'register',
+           'State', 'TrackedScan', 'Tracker', 'TrackerConfig', 'preprocess', 'register',
            'register_correspondences']

@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 from sgor_ros import SgorConfig
 from sgor_ros.core.alignment import align
 from sgor_ros.core.alignment import surface
+from sgor_ros.core.covariance import systematic
 from sgor_ros.core.scan.voxels import voxel_grid
 
 
@@ -28,6 +29,11 @@ def motion(x, y, z, yaw_deg, pitch_deg=0.0):
 
 def aligned(source, target, start, rough=False):
     return align(surface(source, 2), surface(target, 2), start, rough, SgorConfig())
+
+
+def noise(found):
+    """Return the part of the covariance that comes from the pairs."""
+    return found.covariance - found.systematic @ found.systematic.T
 
 
 @pytest.mark.parametrize(('offset', 'rough'), [
@@ -65,9 +71,9 @@ def test_covariance_turns_with_the_target_frame(clouds, move):
     moved = aligned(source, target @ move[:3, :3].T + move[:3, 3], move @ truth)
     np.testing.assert_allclose(moved.T_target_source, move @ plain.T_target_source, atol=2e-3)
     turn = np.kron(np.eye(2), move[:3, :3])
-    expected = turn @ plain.covariance @ turn.T
+    expected = turn @ noise(plain) @ turn.T
     scale = np.sqrt(np.outer(np.diag(expected), np.diag(expected)))
-    np.testing.assert_allclose(moved.covariance / scale, expected / scale, atol=0.03)
+    np.testing.assert_allclose(noise(moved) / scale, expected / scale, atol=0.03)
 
 
 def test_covariance_is_of_the_source_frame_in_the_target(clouds):
@@ -79,9 +85,9 @@ def test_covariance_is_of_the_source_frame_in_the_target(clouds):
     x, y, z = truth[:3, :3] @ np.linalg.inv(shift)[:3, 3]
     carry = np.eye(6)
     carry[:3, 3:] = -np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    expected = carry @ plain.covariance @ carry.T
+    expected = carry @ noise(plain) @ carry.T
     scale = np.sqrt(np.outer(np.diag(expected), np.diag(expected)))
-    np.testing.assert_allclose(moved.covariance / scale, expected / scale, atol=0.05)
+    np.testing.assert_allclose(noise(moved) / scale, expected / scale, atol=0.05)
 
 
 def test_a_plane_leaves_directions_open():
@@ -89,8 +95,7 @@ def test_a_plane_leaves_directions_open():
     rng = np.random.default_rng(0)
     wall = np.c_[rng.normal(8, 0.01, 2000), rng.uniform(-10, 10, 2000), rng.uniform(0, 6, 2000)]
     again = np.c_[rng.normal(8, 0.01, 2000), rng.uniform(-10, 10, 2000), rng.uniform(0, 6, 2000)]
-    covariance = aligned(wall, again, np.eye(4)).covariance
-    sigma = np.sqrt(np.diag(covariance))
+    sigma = np.sqrt(np.diag(noise(aligned(wall, again, np.eye(4)))))
     assert sigma[1:3].min() > 10 * sigma[0]
 
 
@@ -104,3 +109,18 @@ def test_clouds_without_overlap_end_without_a_covariance(clouds):
     found = aligned(source, target, motion(1000, 0, 0, 0))
     assert found.pairs == 0
     assert found.covariance is None
+
+
+def test_systematic_errors_grow_with_the_motion_up_to_an_edge_of_the_grid():
+    """None at rest; along the motion most; a turn counts as the way of what is seen by it."""
+    def sigma(T):
+        root = systematic(T, middle_range=20.0, edge=0.5)
+        return np.sqrt(np.diag(root @ root.T))
+
+    assert not sigma(np.eye(4)).any()
+    short, edge, far = (sigma(motion(x, 0, 0, 0)) for x in (0.1, 0.5, 30.0))
+    np.testing.assert_allclose(edge, 5 * short)
+    np.testing.assert_allclose(far, edge)
+    assert edge[0] > 5 * edge[1] > 0
+    np.testing.assert_allclose(sigma(motion(0, -0.5, 0, 0))[[1, 0, 2]], edge[:3])
+    np.testing.assert_allclose(sigma(motion(0, 0, 0, np.degrees(0.1 / 20)))[3:], short[3:])

@@ -160,14 +160,15 @@ def test_broken_clouds_are_left_out(street, tmp_path, capsys):
 
 def test_time_that_runs_backwards_starts_anew(street, tmp_path, capsys):
     bag = tmp_path / 'bag'
-    write_bag(bag, [(*street[0][:2], 7 * PERIOD_NS), (*street[1][:2], 8 * PERIOD_NS)])
+    write_bag(bag, [(*street[k][:2], (7 + 20 * k) * PERIOD_NS) for k in range(3)])
     with BagReader(bag) as reader:
         raw = [cdr(cloud.read()[2]) for cloud in reader.clouds('/points')]
     again = write_raw(tmp_path / 'again', list(enumerate([*raw, *raw])))
     assert main([str(again), '--output', str(tmp_path)]) == 0
-    assert summary(tmp_path)['restarts'] == [0, 2]
+    # the first that falls back may be late, the second confirms the jump
+    assert summary(tmp_path)['restarts'] == [0, 4]
     assert 'time ran backwards' in capsys.readouterr().err
-    np.testing.assert_array_equal(read_kitti(tmp_path / 'trajectory_kitti.txt')[2], np.eye(4))
+    np.testing.assert_array_equal(read_kitti(tmp_path / 'trajectory_kitti.txt')[4], np.eye(4))
 
 
 def test_missing_label_field_tells_the_fields(street, tmp_path, capsys):

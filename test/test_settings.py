@@ -107,7 +107,7 @@ def test_every_setting_tells_what_it_means():
     for _, item in FIELDS:
         assert item.meaning[0].isupper()
         assert item.description.startswith(item.meaning)
-        assert item.unit in ('', 'm', 'rad', 's')
+        assert item.unit in ('', 'm', 'rad', 's', 'm/s', 'rad/s', 'm/s^2', 'rad/s^2')
         assert all(choice in item.description for choice in item.choices)
         if item.name.endswith(('_angle', '_theta')):
             assert item.unit == 'rad'

@@ -7,8 +7,10 @@ from scipy.spatial.transform import Rotation
 
 from sgor_ros import SemanticScan
 from sgor_ros import SgorConfig
+from sgor_ros import State
 from sgor_ros import Tracker
 from sgor_ros import TrackerConfig
+from sgor_ros.core.common import se3
 from sgor_ros.evaluation.pairs import read_drives
 
 PERIOD_NS = 100_000_000
@@ -34,10 +36,10 @@ def garbage(scans):
                         rng.choice(scans[0].labels, 20000))
 
 
-def track(scans, tracker=None, stamps=None, **settings):
+def track(scans, tracker=None, stamps=None, period_ns=PERIOD_NS, **settings):
     """Return what becomes of scans 0.1 s apart."""
     tracker = tracker or Tracker(tracker_config=TrackerConfig(**settings))
-    stamps = stamps or [i * PERIOD_NS for i in range(len(scans))]
+    stamps = stamps or [i * period_ns for i in range(len(scans))]
     return [tracker.track(scan, stamp) for scan, stamp in zip(scans, stamps, strict=True)]
 
 
@@ -134,20 +136,52 @@ def test_a_gap_is_bridged_without_a_jump(scans, street, garbage, mode):
 
 
 @pytest.mark.parametrize('mode', MODES)
-def test_after_many_failures_the_track_goes_on_from_the_last_pose(scans, others, elsewhere, mode):
-    """Carried away to another street: said, and from there on steps are added to the last pose."""
-    results = track([*scans[:3], *others], mode=mode, max_failures=2)
-    assert [r.success for r in results] == [True, True, True, False, False, True]
-    assert [r.restarted for r in results] == [True, False, False, False, True, False]
-    lost = results[4]
-    assert lost.T_odom_sensor is None
-    assert lost.keyframe
-    assert any('2 registrations in a row failed' in w for w in lost.warnings)
-    again = results[5]
-    assert again.reference_stamp_ns == lost.stamp_ns
-    assert_near(again.T_odom_sensor, results[2].T_odom_sensor @ relative(elsewhere[1][2],
-                                                                         elsewhere[2][2]))
-    assert again.covariance is None    # nobody knows how far the last pose was off
+def test_carried_elsewhere_and_back_it_knows_where_it_is(scans, street, others, mode):
+    """No pose while it is elsewhere, and the true one, not the last one, when it is back."""
+    results = track([*scans[:2], *others, scans[3]], mode=mode, max_failures=2)
+    assert [r.state for r in results] == [
+        State.NEW_TRACK, State.TRACKING, State.FAILED, State.LOST, State.LOST, State.TRACKING]
+    assert [r.failures for r in results] == [0, 0, 1, 2, 3, 0]
+    for lost in results[2:5]:
+        assert not lost.success
+        assert lost.T_odom_sensor is lost.covariance is lost.twist is None
+        assert not lost.keyframe
+    assert any('without a pose: lost' in w for w in results[3].warnings)
+    back = results[5]
+    assert back.track_id == 1
+    assert not back.restarted
+    assert_near(back.T_odom_sensor, relative(street[0][2], street[3][2]))
+    assert back.twist is None    # the mean of such a journey is no velocity
+
+
+@pytest.mark.parametrize('mode', MODES)
+def test_lost_for_long_a_new_track_begins_and_the_old_one_can_come_back(scans, street, others,
+                                                                       elsewhere, mode):
+    """A track elsewhere has a number and an origin of its own; back, the first goes on."""
+    results = track([*scans[:2], *others, scans[2], scans[3]], period_ns=2 * PERIOD_NS, mode=mode,
+                    max_failures=2, new_track_after=0.3)
+    assert [r.state for r in results] == [
+        State.NEW_TRACK, State.TRACKING, State.FAILED, State.NEW_TRACK, State.TRACKING,
+        State.TRACKING, State.TRACKING]
+    assert [r.track_id for r in results] == [1, 1, 1, 2, 2, 1, 1]
+    assert [r.restarted for r in results] == [True, False, False, True, False, False, False]
+    begun = results[3]
+    np.testing.assert_array_equal(begun.T_odom_sensor, np.eye(4))
+    assert any('lost for 0.4 s: a new track begins' in w for w in begun.warnings)
+    assert_near(results[4].T_odom_sensor, relative(elsewhere[1][2], elsewhere[2][2]))
+    assert any('track 1 is found again' in w for w in results[5].warnings)
+    for result, i in ((results[5], 2), (results[6], 3)):
+        assert_near(result.T_odom_sensor, relative(street[0][2], street[i][2]))
+
+
+def test_a_new_track_finds_back_at_its_next_keyframe(scans, street, garbage):
+    """Blinded, it begins anew twice; each keyframe tries an older one, and joins its track."""
+    tracker = Tracker(tracker_config=TrackerConfig(max_failures=1, new_track_after=0.0,
+                                                   retries=0, keyframe_distance=1.0))
+    results = track([scans[0], garbage, scans[1], scans[2], scans[3]], tracker)
+    assert [r.track_id for r in results] == [1, 2, 3, 3, 1]
+    assert results[4].state is State.TRACKING
+    assert_near(results[4].T_odom_sensor, relative(street[0][2], street[3][2]))
 
 
 def test_failures_are_counted_in_a_row(scans, garbage):
@@ -157,10 +191,13 @@ def test_failures_are_counted_in_a_row(scans, garbage):
     assert not any(r.restarted for r in results[1:])
 
 
-def test_a_useless_scan_does_not_become_the_reference(scans, street):
-    """One point, however often: the reference stays, and nothing claims a restart."""
-    point = SemanticScan([[5, 0, 0]], [50])
-    results = track([scans[0], *[point] * 4, scans[1]], max_failures=2)
+@pytest.mark.parametrize('points', [1, 10])
+@pytest.mark.parametrize('mode', MODES)
+def test_a_useless_scan_does_not_become_the_reference(scans, street, points, mode):
+    """A handful of points, however often and long: no track begins with them."""
+    few = SemanticScan(scans[0].points[:points], scans[0].labels[:points])
+    results = track([scans[0], *[few] * 4, scans[1]], max_failures=2, new_track_after=0.1,
+                    mode=mode)
     assert [r.success for r in results] == [True] + [False] * 4 + [True]
     assert not any(r.restarted or r.keyframe for r in results[1:5])
     assert results[5].reference_stamp_ns == 0
@@ -178,25 +215,34 @@ def test_a_useless_first_scan_is_not_the_origin(scans, street):
     assert_near(results[2].T_odom_sensor, relative(street[0][2], street[1][2]))
 
 
-def test_time_that_runs_backwards_starts_anew(scans, street):
-    """A bag that starts over: identity again, and a warning that says by how much."""
-    results = track(scans[:4], stamps=[5 * 10**9, 5 * 10**9 + PERIOD_NS, 10**9, 10**9 + PERIOD_NS])
-    assert any('time ran backwards by 4.100 s' in w for w in results[2].warnings)
-    assert results[2].restarted
-    np.testing.assert_array_equal(results[2].T_odom_sensor, np.eye(4))
-    assert_near(results[3].T_odom_sensor, relative(street[2][2], street[3][2]))
+def test_a_late_scan_is_dropped_and_counted(scans, street):
+    """Swapped, twice, or without a stamp: said, and the track goes on as if nothing had been."""
+    stamps = [10**9, 2 * 10**9, 2 * 10**9 - PERIOD_NS, 0, 2 * 10**9, 3 * 10**9]
+    results = track([scans[0], scans[1], scans[3], scans[3], scans[1], scans[2]], stamps=stamps)
+    assert [r.state for r in results] == [State.NEW_TRACK, State.TRACKING, *[State.LATE] * 3,
+                                          State.TRACKING]
+    assert [r.late for r in results] == [0, 0, 1, 2, 3, 3]
+    assert 'stamp 1.900 s is not after the last, 2.000 s' in results[2].reason
+    for late in results[2:5]:
+        assert not late.success
+        assert late.T_odom_sensor is late.covariance is late.twist is late.registration is None
+    last = results[5]
+    assert last.track_id == 1
+    assert_near(last.T_odom_sensor, relative(street[0][2], street[2][2]))
+    assert_near(se3.exp(last.twist), relative(street[1][2], street[2][2]), 0.03)
 
 
-@pytest.mark.parametrize('mode', MODES)
-def test_the_same_scan_and_stamp_twice(scans, street, mode):
-    """It stays where it is, has no twist, and the next is right."""
-    results = track([scans[0], scans[1], scans[1], scans[2]], mode=mode,
-                    stamps=[0, PERIOD_NS, PERIOD_NS, 2 * PERIOD_NS])
-    assert all(r.success for r in results)
-    assert_near(results[2].T_odom_sensor, results[1].T_odom_sensor, 0.01, 0.02)
-    if mode == 'consecutive':
-        assert results[2].twist is None
-    assert_near(results[3].T_odom_sensor, relative(street[0][2], street[2][2]))
+def test_a_bag_that_starts_over_begins_a_new_track(scans, street):
+    """The second scan behind confirms it: identity again, and a warning that says by how much."""
+    results = track([*scans[:2], *scans[1:]], stamps=[
+        5 * 10**9, 5 * 10**9 + PERIOD_NS, 10**9, 10**9 + PERIOD_NS, 10**9 + 2 * PERIOD_NS])
+    assert [r.state for r in results] == [State.NEW_TRACK, State.TRACKING, State.LATE,
+                                          State.NEW_TRACK, State.TRACKING]
+    assert any('time ran backwards by 4.000 s' in w for w in results[3].warnings)
+    assert [r.track_id for r in results] == [1, 1, 1, 2, 2]
+    assert results[3].restarted
+    np.testing.assert_array_equal(results[3].T_odom_sensor, np.eye(4))
+    assert_near(results[4].T_odom_sensor, relative(street[2][2], street[3][2]))
 
 
 def test_reset_forgets_everything(scans):
@@ -205,60 +251,32 @@ def test_reset_forgets_everything(scans):
     tracker.reset()
     result = tracker.track(scans[2], 0)
     assert result.restarted
+    assert result.track_id == 2
     assert result.warnings == ()
     np.testing.assert_array_equal(result.T_odom_sensor, np.eye(4))
 
 
 @pytest.mark.parametrize('yaw', [0.0, 0.3])
 def test_twist_is_motion_over_time_in_the_sensor_frame(scans, street, yaw):
-    """1.5 m and a turn in 0.1 s: 15 m/s, seen from the turned sensor; half that in twice the time.
-    """
+    """1.5 m and a turn in 0.1 s: the velocity that, held for so long, leads there."""
     second, turn = spun(scans[1], yaw)
     T = relative(street[0][2], street[1][2]) @ turn
-    velocity = T[:3, :3].T @ T[:3, 3]
-    rate = Rotation.from_matrix(T[:3, :3]).as_rotvec()
     for seconds in (0.1, 0.2):
-        twist = track([scans[0], second], stamps=[0, round(seconds * 1e9)])[1].twist
-        np.testing.assert_allclose(twist[:3] * seconds, velocity, atol=0.03)
-        np.testing.assert_allclose(twist[3:] * seconds, rate, atol=0.005)
-    assert np.linalg.norm(velocity) == pytest.approx(1.5, abs=0.1)
+        result = track([scans[0], second], stamps=[0, round(seconds * 1e9)])[1]
+        assert_near(se3.exp(result.twist * seconds), T, 0.03, 0.2)
+        sigma = np.sqrt(np.diag(result.twist_covariance)) * seconds
+        assert (sigma[:3] < 0.03).all()
+        assert (sigma > 1e-4).all()
+        assert np.linalg.norm(result.twist[:3]) == pytest.approx(1.5 / seconds, rel=0.05)
 
 
-def sampled(mean, covariance, rng, count):
-    """Return (count, 4, 4) poses perturbed from the left, translation of the origin apart."""
-    noise = rng.multivariate_normal(np.zeros(6), covariance, count)
-    T = np.tile(np.eye(4), (count, 1, 1))
-    T[:, :3, :3] = Rotation.from_rotvec(noise[:, 3:]).as_matrix() @ mean[:3, :3]
-    T[:, :3, 3] = mean[:3, 3] + noise[:, :3]
-    return T
-
-
-def spread(T, mean):
-    """Return the (6, 6) covariance of poses around their mean."""
-    turn = Rotation.from_matrix(T[:, :3, :3] @ mean[:3, :3].T).as_rotvec()
-    return np.cov(np.hstack((T[:, :3, 3] - mean[:3, 3], turn)).T)
-
-
-def test_covariance_is_that_of_composed_noise(others):
-    """Steps of 6 m with turns, each with the noise it reports: Monte Carlo finds the same.
-
-    Compared where the sum is a unit matrix, so that a wrong lever or frame shows.
-    """
-    turned = [spun(scan, yaw)[0] for scan, yaw in zip(others, (0.0, 1.2, -0.8), strict=True)]
-    results = track(turned, mode='consecutive')
-    assert all(r.success for r in results)
-    rng, count = np.random.default_rng(0), 40000
-    T = np.tile(np.eye(4), (count, 1, 1))
-    before = 0.0
-    for result in results[1:]:
-        step = result.registration
-        # larger noise would bend: 1 in 100 of it, as variances are linear
-        T = T @ sampled(step.T_target_source, step.covariance * 1e-2, rng, count)
-        whiten = np.linalg.inv(np.linalg.cholesky(result.covariance))
-        found = whiten @ spread(T, result.T_odom_sensor) @ whiten.T * 1e2
-        np.testing.assert_allclose(found, np.eye(6), atol=0.04)
-        assert np.trace(result.covariance[:3, :3]) > before
-        before = np.trace(result.covariance[:3, :3])
+@pytest.mark.parametrize('mode', MODES)
+def test_twist_is_of_the_last_motion_and_not_since_the_keyframe(scans, mode):
+    """Two moves at 15 m/s, then standing for long: 15, 15, and at once nothing."""
+    results = track([*scans[:3], scans[2], scans[2]], mode=mode, keyframe_distance=100.0,
+                    stamps=[0, PERIOD_NS, 2 * PERIOD_NS, 3 * PERIOD_NS, 10**10])
+    speeds = [np.linalg.norm(r.twist[:3]) for r in results[1:]]
+    np.testing.assert_allclose(speeds, [15.0, 15.0, 0.0, 0.0], atol=0.3)
 
 
 def test_covariance_is_that_of_the_keyframe_and_one_step(scans):
@@ -266,13 +284,31 @@ def test_covariance_is_that_of_the_keyframe_and_one_step(scans):
     consecutive = track(scans, mode='consecutive')[-1].covariance
     result = track(scans, **FAR)[-1]
     np.testing.assert_allclose(result.covariance, result.registration.covariance, rtol=1e-9)
+    np.testing.assert_array_equal(result.reference_covariance, result.registration.covariance)
+    np.testing.assert_array_equal(result.T_reference_sensor, result.registration.T_target_source)
     assert np.trace(result.covariance[:3, :3]) < np.trace(consecutive[:3, :3])
+
+
+@pytest.mark.parametrize('mode', MODES)
+def test_the_same_scan_twice_has_a_covariance_that_can_be_inverted(scans, mode):
+    """No noise between them, but a pose graph takes the inverse."""
+    result = track([scans[0], scans[0]], mode=mode)[1]
+    assert_near(result.T_odom_sensor, np.eye(4), 0.001, 0.001)
+    np.linalg.cholesky(result.reference_covariance)
+
+
+def test_a_motion_that_cannot_be_is_refused(scans):
+    """1.5 m in 0.1 s with at most 10 m/s: no pose; after 0.3 s it may have gone there."""
+    results = track(scans[:3], stamps=[0, PERIOD_NS, 4 * PERIOD_NS], max_speed=10.0)
+    assert [r.state for r in results] == [State.NEW_TRACK, State.FAILED, State.TRACKING]
+    assert 'm/s is over max_speed 10.0' in results[1].reason
 
 
 def test_without_local_refinement_there_is_no_covariance(scans):
     results = track(scans[:2], Tracker(SgorConfig(local_refinement=False)))
     assert results[1].success
-    assert results[1].covariance is None
+    assert results[1].covariance is results[1].twist_covariance is None
+    assert results[1].twist is not None
 
 
 def test_settings_change_between_scans_without_losing_the_track(scans, street):

@@ -130,7 +130,7 @@ class Steps:
             yield '/odometry', messages.odometry(types, placed, odom,
                                                  self._stream.base_frame or sensor)
             yield '/pose', messages.pose_stamped(types, placed, odom)
-            if tracked.registration is not None:
+            if tracked.T_reference_sensor is not None:
                 yield '/relative_pose', messages.relative_pose(types, tracked, sensor)
         yield '/correspondences', messages.correspondence_markers(
             types, self._placement.of_sensor(tracked), odom)

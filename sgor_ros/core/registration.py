@@ -121,7 +121,7 @@ def _locally(result: Registration, source: PreparedScan, target: PreparedScan,
         agree = distances(local.T_target_source, result.source_points,
                           result.target_points) < config.tau_1
         result = replace(result, T_target_source=local.T_target_source,
-                         covariance=local.covariance, inliers=agree)
+                         covariance=local.covariance, systematic=local.systematic, inliers=agree)
     return judge(result, source.view, target.view, config.evidence_reach, config)
 
 

@@ -50,6 +50,9 @@ class Registration:
     covariance : (6, 6) float64 or None
         Of (x, y, z, rotation about x, y, z) in the target frame, m^2 and rad^2.
         Along a degenerate direction its variance is what is really unknown, metres or radians.
+    systematic : (6, 6) float64 or None
+        Square root S of that part of the covariance, S S^T, that errs alike in the steps of a
+        drive, so that it adds up instead of averaging out.
     degenerate : (K, 6) float64
         Unit directions (x, y, z, rotation about x, y, z) in the target frame along which the
         clouds slide on each other (degeneracy); empty where all six are held. Never with
@@ -80,6 +83,7 @@ class Registration:
     inliers: NDArray[np.bool_]
     confidence: float = 0.0
     covariance: NDArray[np.float64] | None = None
+    systematic: NDArray[np.float64] | None = None
     degenerate: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 6)))
     alternatives: tuple[Placement, ...] = ()
     hypotheses: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 4, 4)))

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..io.environment import describe_environment
+from .nees import BOUND
 from .run import MAX_RE_DEG
 from .run import MAX_TE_M
 from .run import Row
@@ -124,10 +125,17 @@ def sequence_table(tracks: Sequence[Track]) -> str:
             f'{track.lengths_m[0]:g}-{track.lengths_m[-1]:g}',
             f'{found.drift.translation_percent:.2f}', f'{found.drift.rotation_deg_per_m:.4f}',
             f'{100 * np.median(found.translation_m):.1f}', f'{np.median(found.rotation_deg):.3f}',
+            _honesty(track.relative_nees), _honesty(track.absolute_nees),
             str(track.without_pose), times(track.seconds[SETTLED:])])
     return markdown(['drive: method', 'scans', 'way [m]', 'stretches [m]', 'drift [%]',
-                     'drift [deg/m]', 'TE of a step [cm]', 'RE of a step [deg]', 'without a pose',
-                     'time a scan [ms]'], lines)
+                     'drift [deg/m]', 'TE of a step [cm]', 'RE of a step [deg]',
+                     'NEES of a step', 'NEES of a pose', 'without a pose', 'time a scan [ms]'],
+                    lines)
+
+
+def _honesty(nees: NDArray[np.float64]) -> str:
+    """Return the mean, 6 where a covariance is right, and the share below the bound of 99.7 %."""
+    return f'{nees.mean():.1f}, {np.mean(nees < BOUND):.0%}' if len(nees) else '-'
 
 
 def scan_records(tracks: Sequence[Track]) -> list[dict[str, Any]]:

@@ -3,6 +3,7 @@ from collections.abc import Callable
 from collections.abc import Iterable
 from collections.abc import Sequence
 from dataclasses import dataclass
+from dataclasses import replace
 from importlib.util import find_spec
 import time
 
@@ -13,9 +14,11 @@ from tqdm import tqdm
 from ..core.config import SgorConfig
 from ..core.scan.scan import SemanticScan
 from ..core.warmup import warm_up
+from ..tracker import TrackedScan
 from ..tracker import Tracker
 from ..tracker import TrackerConfig
 from .metrics import KITTI_LENGTHS_M
+from .nees import track_nees
 from .pairs import Drive
 from .rivals import kiss_icp
 from .rivals import scan_to_scan
@@ -46,6 +49,8 @@ class Track:
         Stretches that the drift was measured over.
     without_pose : int
     seconds : (N,) float64
+    relative_nees, absolute_nees : (K,) float64
+        Of `track_nees`; empty where the odometry gives no covariance.
     """
 
     method: str
@@ -55,12 +60,14 @@ class Track:
     lengths_m: tuple[float, ...]
     without_pose: int
     seconds: Array
+    relative_nees: Array
+    absolute_nees: Array
 
 
 def odometries(config: SgorConfig, say: Callable[[str], None]) -> dict[str, Callable[[], Step]]:
     """Return what makes each odometry, by name; rivals where they are installed."""
     makers: dict[str, Callable[[], Step]] = {
-        f'SGOR, {mode}': lambda mode=mode: _sgor(config, mode)    # type: ignore[misc]
+        f'SGOR, {mode}': lambda mode=mode: _Sgor(config, mode)    # type: ignore[misc]
         for mode in ('consecutive', 'keyframe')}
     if find_spec('kiss_icp') is None:
         say("kiss_icp is not installed, so left out; pip install 'sgor_ros[benchmark]'")
@@ -70,18 +77,19 @@ def odometries(config: SgorConfig, say: Callable[[str], None]) -> dict[str, Call
     return makers
 
 
-def _sgor(config: SgorConfig, mode: str) -> Step:
-    tracker = Tracker(config, TrackerConfig(mode=mode))
-    count = 0
+class _Sgor:
+    """The tracker, and what it said of each scan."""
 
-    def step(scan: SemanticScan) -> Array | None:
-        nonlocal count
-        count += 1
+    def __init__(self, config: SgorConfig, mode: str) -> None:
+        self._tracker = Tracker(config, TrackerConfig(mode=mode))
+        self.tracked: list[TrackedScan] = []
+
+    def __call__(self, scan: SemanticScan) -> Array | None:
         # built anew, as a raw scan has to be
-        return tracker.track(SemanticScan(scan.points, scan.labels), count * PERIOD_NS
-                             ).T_odom_sensor
-
-    return step
+        result = self._tracker.track(SemanticScan(scan.points, scan.labels),
+                                     (len(self.tracked) + 1) * PERIOD_NS)
+        self.tracked.append(replace(result, registration=None))
+        return result.T_odom_sensor
 
 
 def _unlabelled(take: Callable[[NDArray[np.float32]], Array]) -> Step:
@@ -109,11 +117,12 @@ def run_drive(drive: Drive, makers: dict[str, Callable[[], Step]], config: SgorC
             T = odometry[name](scan)
             seconds[name].append(time.perf_counter() - start)
             poses[name].append(T)
-    return [_track(name, drive.name, poses[name], truth, seconds[name]) for name in makers]
+    return [_track(name, drive.name, poses[name], truth, seconds[name], odometry[name])
+            for name in makers]
 
 
 def _track(method: str, drive: str, poses: Sequence[Array | None], truth: Array,
-           seconds: Iterable[float]) -> Track:
+           seconds: Iterable[float], odometry: Step) -> Track:
     held: list[Array] = []
     for T in poses:
         held.append(T if T is not None else held[-1] if held else np.eye(4))
@@ -122,4 +131,6 @@ def _track(method: str, drive: str, poses: Sequence[Array | None], truth: Array,
     shrink = min(1.0, way / 1000)
     lengths = tuple(round(length * shrink, 2) for length in KITTI_LENGTHS_M)
     return Track(method, drive, track_errors(np.array(held), truth, lengths), truth, lengths,
-                 sum(T is None for T in poses), np.array(list(seconds)))
+                 sum(T is None for T in poses), np.array(list(seconds)),
+                 *track_nees(odometry.tracked if isinstance(odometry, _Sgor) else [],
+                             truth if isinstance(odometry, _Sgor) else truth[:0]))

@@ -40,7 +40,7 @@ class Outputs:
         """Send what there is of a scan; return why it has no pose although it was registered."""
         trouble = ''
         if tracked.success:
-            if tracked.registration is not None:
+            if tracked.T_reference_sensor is not None:
                 self._relative.publish(messages.relative_pose(ros_type, tracked, sensor_frame))
             trouble = self._publish_pose(tracked, sensor_frame)
         if not trouble and self._markers.get_subscription_count():

@@ -26,7 +26,7 @@ def setting(default: Value, meaning: str, unit: str = '', *, minimum: float | No
     meaning : str
         One sentence for ``--help``, the YAML comment and the ROS parameter description.
     unit : str
-        ``'m'``, ``'rad'``, ``'s'`` or empty.
+        ``'m'``, ``'rad'``, ``'s'``, a quotient of them such as ``'m/s'``, or empty.
     minimum, maximum : float, optional
         Bounds, both inclusive.
     choices : tuple of str

@@ -1,0 +1,271 @@
+"""The way of a scan through the tracker, on one screen."""
+from dataclasses import dataclass
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core.common import se3
+from ..core.config import SgorConfig
+from ..core.registration import register
+from ..core.result import Registration
+from ..core.scan.preprocessing import preprocess
+from ..core.scan.scan import PreparedScan
+from ..core.scan.scan import SemanticScan
+from .choice import choose
+from .choice import refined
+from .choice import Step
+from .choice import UNKNOWN_COVARIANCE
+from .config import TrackerConfig
+from .covariance import PoseCovariance
+from .keyframes import Keyframe
+from .keyframes import Keyframes
+from .motion import Motion
+from .result import State
+from .result import TrackedScan
+from .stamps import Arrival
+from .stamps import Stamps
+
+Array = NDArray[np.float64]
+
+
+@dataclass(eq=False)
+class _Scan:
+    """The scan at work: what it has become so far."""
+
+    prepared: PreparedScan
+    stamp_ns: int
+    warnings: list[str]
+    timings: dict[str, float]
+    registration: Registration | None = None
+    reference: Keyframe | None = None
+
+
+class Tracker:
+    """Registers each scan to a reference and composes the poses.
+
+    Live node and replay drive this same object. A scan that cannot be registered has no pose; the
+    next bridges the gap, and after many the track is lost. All the while other keyframes are
+    tried in turns, those of earlier tracks too: where one is recognised, its track goes on. Lost
+    for long, a new track begins, with a number of its own.
+    """
+
+    def __init__(self, config: SgorConfig | None = None,
+                 tracker_config: TrackerConfig | None = None) -> None:
+        self.config = config or SgorConfig()
+        self.tracker_config = tracker_config or TrackerConfig()
+        self._late = 0
+        self._tracks = 0
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything: the next scan is the origin of a new track."""
+        self._stamps = Stamps()
+        self._forget()
+
+    def track(self, scan: SemanticScan, stamp_ns: int) -> TrackedScan:
+        """Take the next scan.
+
+        Parameters
+        ----------
+        scan : SemanticScan
+        stamp_ns : int
+            Its stamp, nanoseconds. A scan that is not newer than the last is dropped; a clock
+            that has gone back for good begins a new track.
+        """
+        before_ns = self._stamps.newest_ns
+        arrival = self._stamps.judge(stamp_ns, self.tracker_config)
+        if arrival is Arrival.LATE:
+            return self._drop(stamp_ns)
+        warnings = []
+        if arrival is Arrival.ANEW:
+            assert before_ns is not None
+            warnings = [f'time ran backwards by {(before_ns - stamp_ns) * 1e-9:.3f} s: a new '
+                        'track begins']
+            self._forget()
+        prepared = preprocess(scan, self.config)
+        new = _Scan(prepared, stamp_ns, [*warnings, *prepared.warnings], dict(prepared.timings))
+        if self._reference is None:
+            return self._begin(new)
+        step = self._step(new, self._reference)
+        if isinstance(step, Step):
+            # in a new track each new place is a chance to find back to an old track
+            older = self._recognise(new, 1, earlier=True) if self._is_elsewhere(step) else None
+            return self._accept(new, older or step)
+        other = self._recognise(new, self.tracker_config.retries)
+        return self._fail(new, step) if other is None else self._accept(new, other)
+
+    def _forget(self) -> None:
+        self._keyframes = Keyframes()
+        self._reference: Keyframe | None = None
+        self._motion = Motion.unknown(0, np.eye(4), np.zeros((6, 6)), self.tracker_config)
+        self._track_id = self._tracks
+        self._failures = 0
+
+    def _drop(self, stamp_ns: int) -> TrackedScan:
+        self._late += 1
+        return TrackedScan(
+            stamp_ns, False, f'stamp {stamp_ns * 1e-9:.3f} s is not after the last, '
+            f'{(self._stamps.newest_ns or 0) * 1e-9:.3f} s', None, None, None, None, None, False,
+            False, (), {}, State.LATE, self._track_id, failures=self._failures, late=self._late)
+
+    def _begin(self, new: _Scan) -> TrackedScan:
+        """Make the scan the origin of a new track, if something can be registered to it."""
+        keypoints = len(new.prepared.features.points)
+        if keypoints < self.tracker_config.min_keypoints:
+            return self._fail(new, f'only {keypoints} keypoints to start from')
+        self._tracks += 1
+        self._track_id = self._tracks
+        self._failures = 0
+        origin = PoseCovariance.origin()
+        self._reference = Keyframe(new.prepared, new.stamp_ns, self._track_id, np.eye(4), origin)
+        self._motion = Motion.unknown(new.stamp_ns, np.eye(4), np.zeros((6, 6)),
+                                      self.tracker_config)
+        self._keyframes.add(self._reference, self.tracker_config.max_keyframes)
+        return replace(self._result(new, State.NEW_TRACK), success=True, T_odom_sensor=np.eye(4),
+                       covariance=origin.pose, keyframe=True, restarted=True)
+
+    def _step(self, new: _Scan, keyframe: Keyframe) -> Step | str:
+        """Register a scan to a keyframe; return the step to it, or why there is none."""
+        keyframe = keyframe.ready(self.config)
+        found = register(new.prepared, keyframe.prepared, self.config)
+        for stage, seconds in found.timings.items():
+            new.timings[stage] = new.timings.get(stage, 0.0) + seconds
+        assert self._reference is not None
+        if keyframe.stamp_ns == self._reference.stamp_ns:
+            self._reference = keyframe
+            step = choose(found, self._motion_before(new.stamp_ns), new.stamp_ns,
+                          self.tracker_config, lambda placement: refined(
+                              placement, new.prepared, keyframe.prepared, self.config))
+        elif found.success and found.T_target_source is not None:
+            step = self._distant_step(found, keyframe, new.stamp_ns)
+        else:
+            step = found.reason
+        if new.registration is None or not isinstance(step, str):
+            new.registration, new.reference = found, keyframe
+        return step
+
+    def _distant_step(self, found: Registration, keyframe: Keyframe, stamp_ns: int
+                      ) -> Step | str:
+        """Return a step to a keyframe that is not the reference, if the sensor can be there."""
+        assert self._reference is not None
+        assert found.T_target_source is not None
+        step = Step(found.T_target_source, found.covariance, found.systematic)
+        if keyframe.track_id != self._track_id:
+            return step
+        T = (se3.inverse(self._reference.T_odom_sensor) @ keyframe.T_odom_sensor
+             @ found.T_target_source)
+        return self._motion_before(stamp_ns).impossible(stamp_ns, T, self.tracker_config) or step
+
+    def _motion_before(self, stamp_ns: int) -> Motion:
+        """Return the last motion; where its stamp lay in the future, the place alone."""
+        motion = self._motion
+        return motion if motion.stamp_ns < stamp_ns else Motion.unknown(
+            stamp_ns - 1, motion.T_reference_sensor, motion.pose_covariance, self.tracker_config)
+
+    def _recognise(self, new: _Scan, tries: int, *, earlier: bool = False) -> Step | None:
+        """Try other keyframes, or those of earlier tracks; each scan a few, in turns."""
+        assert self._reference is not None
+        for keyframe in self._keyframes.in_turns(tries, self._reference,
+                                                 self._track_id if earlier else None):
+            if not isinstance(step := self._step(new, keyframe), str):
+                return step
+        return None
+
+    def _accept(self, new: _Scan, step: Step) -> TrackedScan:
+        """Give a registered scan its pose, and decide what the next is registered to."""
+        keyframe, T = new.reference, step.T_reference_sensor
+        assert keyframe is not None
+        if keyframe.track_id != self._track_id:
+            new.warnings.append(f'track {keyframe.track_id} is found again and goes on')
+        if step.note:
+            new.warnings.append(step.note)
+        moving = self._move(new, keyframe, step)
+        self._reference, self._track_id, self._failures = keyframe, keyframe.track_id, 0
+        T_odom_sensor = keyframe.T_odom_sensor @ T
+        covariance = None
+        if keyframe.covariance is not None and step.covariance is not None:
+            covariance = keyframe.covariance.then(keyframe.T_odom_sensor, T, step.covariance,
+                                                  step.systematic)
+        result = replace(
+            self._result(new, State.TRACKING if step.fused is None else State.DEGENERATE),
+            success=True, T_odom_sensor=T_odom_sensor,
+            covariance=None if covariance is None else covariance.pose,
+            twist=self._motion.twist if moving else None,
+            twist_covariance=(self._motion.twist_covariance
+                              if moving and step.covariance is not None else None),
+            T_reference_sensor=T, reference_covariance=step.covariance)
+        if not self._is_keyframe(new, step):
+            return result
+        kept = self._is_elsewhere(step) or self.tracker_config.mode == 'keyframe'
+        self._reference = Keyframe(new.prepared, new.stamp_ns, self._track_id, T_odom_sensor,
+                                   covariance)
+        self._motion = self._motion.at_new_reference()
+        if kept:
+            self._keyframes.add(self._reference, self.tracker_config.max_keyframes)
+        return replace(result, keyframe=True)
+
+    def _move(self, new: _Scan, keyframe: Keyframe, step: Step) -> bool:
+        """Take in the motion of a step; return whether the velocity is known."""
+        assert self._reference is not None
+        covariance = UNKNOWN_COVARIANCE if step.covariance is None else step.covariance
+        before = self._motion
+        if step.fused is not None:
+            self._motion = step.fused
+        elif (keyframe.stamp_ns == self._reference.stamp_ns and before.stamp_ns < new.stamp_ns
+              and self._failures < self.tracker_config.max_failures):
+            self._motion = before.measured(new.stamp_ns, step.T_reference_sensor, covariance)
+        else:
+            self._motion = Motion.unknown(new.stamp_ns, step.T_reference_sensor, covariance,
+                                          self.tracker_config)
+            return False
+        return True
+
+    def _fail(self, new: _Scan, reason: str) -> TrackedScan:
+        """Give no pose; the keyframes stay, until after long a new track begins."""
+        config = self.tracker_config
+        self._failures += 1
+        lost = self._failures >= config.max_failures
+        seconds = self._motion.seconds_to(new.stamp_ns)
+        if (lost and self._reference is not None and seconds > config.new_track_after
+                and len(new.prepared.features.points) >= config.min_keypoints):
+            self._keyframes.keep(self._reference, config.max_keyframes)
+            new.warnings.append(f'lost for {seconds:.1f} s: a new track begins')
+            return self._begin(new)
+        if self._failures == config.max_failures:
+            new.warnings.append(f'{self._failures} scans in a row without a pose: lost')
+        return replace(self._result(new, State.LOST if lost else State.FAILED), reason=reason)
+
+    def _result(self, new: _Scan, state: State) -> TrackedScan:
+        """Return what is known of a scan before it has a pose."""
+        return TrackedScan(
+            new.stamp_ns, False, '', None, None, None, new.registration,
+            None if new.reference is None else new.reference.stamp_ns, False, False,
+            tuple(new.warnings), new.timings, state, self._track_id, failures=self._failures,
+            late=self._late)
+
+    def _is_keyframe(self, new: _Scan, step: Step) -> bool:
+        """Whether the next scan is to be registered to this one."""
+        c, T = self.tracker_config, step.T_reference_sensor
+        assert self._reference is not None
+        assert new.registration is not None
+        if len(new.prepared.features.points) < c.min_keypoints:
+            return False
+        count = int(new.registration.inliers.sum())
+        if self._reference.first_inliers is None:
+            self._reference = replace(self._reference, first_inliers=count)
+        share = count / max(self._reference.first_inliers or 0, 1)
+        return (c.mode == 'consecutive' or _is_far(T, c) or share < c.keyframe_inliers)
+
+    def _is_elsewhere(self, step: Step) -> bool:
+        """Whether a scan is far from the newest keyframe that is remembered of this track."""
+        last = self._keyframes.last(self._track_id)
+        assert self._reference is not None
+        return last is None or _is_far(
+            se3.inverse(last.T_odom_sensor) @ self._reference.T_odom_sensor
+            @ step.T_reference_sensor, self.tracker_config)
+
+
+def _is_far(T: Array, config: TrackerConfig) -> bool:
+    return (float(np.linalg.norm(T[:3, 3])) > config.keyframe_distance
+            or se3.angle(T[:3, :3]) > config.keyframe_angle)
