@@ -3,6 +3,7 @@ from .core.common.settings import InputError
 from .core.config import SgorConfig
 from .core.registration import register
 from .core.registration import register_correspondences
+from .core.result import Placement
 from .core.result import Registration
 from .core.scan.preprocessing import preprocess
 from .core.scan.scan import PreparedScan
@@ -12,6 +13,6 @@ from .tracker import TrackedScan
 from .tracker import Tracker
 from .tracker import TrackerConfig
 
-__all__ = ['InputError', 'PreparedScan', 'Registration', 'SemanticScan', 'SgorConfig',
+__all__ = ['InputError', 'Placement', 'PreparedScan', 'Registration', 'SemanticScan', 'SgorConfig',
            'State', 'TrackedScan', 'Tracker', 'TrackerConfig', 'preprocess', 'register',
            'register_correspondences']

@@ -287,7 +287,11 @@ def test_wrong_command(sequences_folder, tmp_path):
     assert main(['wrong', '--data', str(sequences_folder), '--limit', '2', '--count', '3',
                  '--output', str(out)]) == 0
     rows = rows_of(out)
-    assert [r['right'] for r in rows].count('False') == 3
+    for method in ('SGOR', 'SGOR, no labels'):
+        own = [r['right'] for r in rows if r['method'] == method]
+        assert (own.count('True'), own.count('False')) == (2, 3)
+    # the built-in world stays out where data is given
+    assert {r['data_set'] for r in rows} == {'kitti'}
     assert '(default)' in (out / 'table.md').read_text()
     assert (out / 'confidence.png').is_file()
 

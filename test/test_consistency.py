@@ -84,6 +84,16 @@ def assert_graph_and_rows(matches, config, printed_cutoff=None):
         assert (np.diff(scores) <= 0).all()
 
 
+def test_agreement_of_labels_by_hand():
+    """What has no label agrees with every class, in point labels and in regional ones."""
+    here, there = np.array([0, 0, 13, 13, 13], np.uint8), np.array([0, 13, 0, 13, 15], np.uint8)
+    points, same = np.zeros((5, 3)), np.full(5, 13, np.uint8)
+    for labels, column in (((here, there, same, same), 0), ((same, same, here, there), 1)):
+        agree = label_agreement(Correspondences(points, points, *labels), 'loose')
+        assert agree[column].tolist() == [True, True, True, True, False]
+        assert agree[1 - column].all()
+
+
 @pytest.mark.parametrize('cutoff', CUTOFFS)
 @pytest.mark.parametrize(('n', 'share', 'seed'), [(40, 0.5, 0), (301, 0.1, 1), (500, 0.9, 2)])
 def test_random_matches_equal_the_dense_reference(n, share, seed, cutoff):

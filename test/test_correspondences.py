@@ -41,7 +41,8 @@ def brute_force(source, target, config):
             p[:, None, used] - q[None][..., used], axis=-1)**2
     allowed = np.ones(gap.shape, bool)
     if config.match_within_labels and config.semantics != 'none':
-        allowed &= source.regional[:, None] == target.regional[None]
+        a, b = source.regional[:, None], target.regional[None]
+        allowed &= (a == b) | (a == 0) | (b == 0)
     if config.height_gate > 0:
         allowed &= np.abs(source.heights[:, None] - target.heights[None]) <= config.height_gate
     gap[~allowed] = np.inf
@@ -89,6 +90,7 @@ def test_without_semantics_labels_do_not_count():
 def test_keypoints_without_a_candidate_have_no_match():
     """A label that only the source has; a height that only the source has."""
     source, target = features(20, 0), features(30, 1)
+    target = replace(target, regional=np.full(30, 13, np.uint8))
     other = replace(source, regional=np.full(20, 99, np.uint8))
     assert len(match(other, target, SgorConfig(height_gate=0.0))) == 0
     high = replace(source, heights=source.heights + 50)
@@ -111,7 +113,10 @@ def test_nothing_to_match():
 
 
 def test_overlap_region_by_hand():
-    """Eq. 4: 13 is in both; 15 and 18 in one only; what has no label stays."""
+    """Eq. 4: 13 is in both; 15 and 18 in one only; what has no label stays.
+
+    The two of 18 cannot all be the one without a label; 15 has none to be.
+    """
     source, target = features(4, 0), features(3, 1)
     source = replace(source, labels=np.array([13, 15, 0, 13], np.uint8))
     target = replace(target, labels=np.array([18, 13, 18], np.uint8))
@@ -123,6 +128,16 @@ def test_overlap_region_by_hand():
         np.testing.assert_array_equal(part.descriptors, whole.descriptors[rows])
         np.testing.assert_array_equal(part.heights, whole.heights[rows])
         np.testing.assert_array_equal(part.context, whole.context[rows])
+
+
+def test_a_class_may_be_hidden_among_the_unlabelled():
+    """Both points of 18 may be two of the target's three without a label, all three of 15 not."""
+    source, target = features(5, 0), features(4, 1)
+    source = replace(source, labels=np.array([18, 15, 15, 18, 15], np.uint8))
+    target = replace(target, labels=np.array([0, 0, 13, 13], np.uint8))
+    p, q = overlap_region(source, target)
+    assert p.labels.tolist() == [18, 18]
+    assert q.labels.tolist() == [0, 0]
 
 
 @pytest.mark.parametrize(('count', 'most'), [(10, 10), (3, 10), (1000, 7), (1001, 1000), (0, 5)])

@@ -8,8 +8,11 @@ import numpy as np
 import pytest
 
 from sgor_ros.commands.demo import forth_and_back
+from sgor_ros.commands.world_bag import write_world_bag
 from sgor_ros.core.common import se3
+from sgor_ros.core.common.settings import InputError
 from sgor_ros.evaluation.track import track_errors
+from sgor_ros.io.bags import BagReader
 
 
 def run_demo(*arguments):
@@ -33,6 +36,22 @@ def test_demo_plays_the_world_and_agrees_with_the_truth(tmp_path):
         width, height = struct.unpack('>II', (tmp_path / 'demo' / name).read_bytes()[16:24])
         assert min(width, height) > 400
     assert 'received 6, processed 6' in (tmp_path / 'demo/node.log').read_text()
+
+
+def test_a_bag_of_another_place_has_its_clouds_and_truth(tmp_path):
+    truth, world = write_world_bag(tmp_path / 'bag', 3, 0, 'courtyard')
+    with BagReader(tmp_path / 'bag') as reader:
+        clouds = list(reader.clouds(reader.find_topic('label')))
+    assert len(clouds) == len(truth) == 3
+    poses = np.array(list(truth.values()))
+    assert np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1) == pytest.approx(0.3, rel=0.1)
+    assert 50 in world.labels
+    assert np.abs(world.points[world.labels == 48, 2]).max() < 0.2
+
+
+def test_demo_lists_the_places_that_there_are(tmp_path):
+    with pytest.raises(InputError, match=r"place 'moon': not one of street, tunnel, .*courtyard"):
+        write_world_bag(tmp_path / 'bag', 3, 0, 'moon')
 
 
 def test_demo_on_a_machine_that_is_too_slow(tmp_path):

@@ -58,6 +58,17 @@ def test_a_point_of_another_label_neither_agrees_nor_contradicts(wall):
     assert (found.agree, found.contradict) == (0, 0)
 
 
+@pytest.mark.parametrize(('label', 'wall_label'), [(0, WALL), (WALL, 0), (0, 0)])
+def test_what_has_no_label_speaks_by_its_place(label, wall_label):
+    """It agrees with whatever is near, and hangs in the air as everything else does."""
+    y, z = np.meshgrid(np.arange(-5, 5, 0.05), np.arange(-2, 3, 0.05))
+    points = np.c_[np.full(y.size, 10.0), y.ravel(), z.ravel()].astype(np.float32)
+    wall = view(points, keypoints([[10, 0, 0], [10, 3, 0]], [wall_label] * 2), CELL)
+    found = asked(wall, [[10.3, 0.2, 0], [5, 0, 0]], [label] * 2)
+    assert found.agree == pytest.approx((1 + 1) / 4)
+    assert found.contradict == pytest.approx(1 / 4)
+
+
 def test_shares_by_hand(wall):
     """Six points: two agree, one contradicts; back, both keypoints of the wall agree."""
     points = [[10, 0, 0], [10, 3, 0.5], [4, 0, 0], [15, 0, 0], [-5, 0, 0], [10, 0, 0.2]]

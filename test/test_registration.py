@@ -169,6 +169,39 @@ def test_labels_in_one_scan_only(scans, street, labelled):
     assert_right(register(source, target), truth_of(street, 1, 0))
 
 
+def without(scan, way, seed):
+    """Return a scan some of whose labels are missing: 0 in their place."""
+    rng = np.random.default_rng(seed)
+    azimuth = np.arctan2(scan.points[:, 1], scan.points[:, 0])
+    ids = np.unique(scan.labels)
+    gone = {'all': np.ones(len(scan), bool), 'random 90 %': rng.random(len(scan)) < 0.9,
+            'a side': np.sin(azimuth - rng.uniform(-np.pi, np.pi)) > 0,
+            'classes': np.isin(scan.labels, ids[rng.random(len(ids)) < 0.5])}[way]
+    return SemanticScan(scan.points, np.where(gone, 0, scan.labels))
+
+
+@pytest.mark.parametrize('way', ['all', 'random 90 %', 'a side', 'classes'])
+@pytest.mark.parametrize('both', [False, True])
+def test_missing_labels_weaken_and_never_contradict(scans, street, way, both):
+    """Whole scans, points, a half of the view or classes: as right and as sure as without."""
+    source = without(scans[3], way, 0)
+    target = without(scans[0], way, 1) if both else scans[0]
+    result = register(source, target)
+    assert_right(result, truth_of(street, 3, 0))
+    assert result.confidence > 0.93
+    says = 'labels ignored: the source has none'
+    assert (says in result.warnings) == (way == 'all' and not both)
+
+
+def test_one_label_for_everything_is_no_label(scans, street):
+    """In some conventions id 0 is a class: a network that dropped out calls everything a car."""
+    config = SgorConfig(label_convention='semantickitti_train')
+    dropped = preprocess(SemanticScan(scans[1].points, np.zeros(len(scans[1]), int)), config)
+    assert dropped.features.labelled_share == 0
+    assert 'every point is car: treated as unlabelled' in dropped.warnings
+    assert_right(register(dropped, preprocess(scans[0])), truth_of(street, 1, 0))
+
+
 ABLATIONS = {
     'without preprocessing': {'correspondence_preprocessing': False},
     'ground by labels only': {'secondary_ground': False},

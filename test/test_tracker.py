@@ -330,3 +330,14 @@ def test_settings_change_between_scans_without_losing_the_track(scans, street):
     last = tracker.track(scans[3], 4 * PERIOD_NS)
     assert last.keyframe
     assert_near(last.T_odom_sensor, relative(street[0][2], street[3][2]))
+
+
+@pytest.mark.parametrize('mode', MODES)
+@pytest.mark.parametrize('out', [(1, 3), (2, 3), (0,)])
+def test_dropouts_of_the_segmentation_leave_no_mark(scans, street, mode, out):
+    """Scans whose labels are all zero, at the beginning too: no scan lost and no jump."""
+    dropped = [SemanticScan(scan.points, np.zeros(len(scan), int)) if i in out else scan
+               for i, scan in enumerate(scans)]
+    for i, result in enumerate(track(dropped, mode=mode)):
+        assert result.success, result.reason
+        assert_near(result.T_odom_sensor, relative(street[0][2], street[i][2]))

@@ -20,12 +20,16 @@ from ..evaluation import report
 from ..evaluation import run as running
 from ..evaluation import sequences
 from ..evaluation import solver
+from ..evaluation import trust
 from ..evaluation.pairs import Drive
 from ..evaluation.pairs import Pair
 from ..evaluation.run import Method
 from ..evaluation.run import sgor
+from ..evaluation.trust_plots import plot_reliability
 from .benchmark_options import benchmark_parser
 from .options import run
+from .scene_pairs import scene_kinds
+from .scene_pairs import scene_pairs
 
 WORLD_SEEDS = (0, 1)
 WORLD_SCANS, WORLD_SPEED = 40, 45.0
@@ -75,21 +79,37 @@ def pairs(arguments: Namespace) -> int:
 
 
 def wrong(arguments: Namespace) -> int:
-    """Show how far confidence tells right from wrong."""
+    """Show how far confidence tells right from wrong, and what is known not to be known."""
     config = _config(arguments)
-    drives = _drives(arguments)
-    right = _right_pairs(arguments, drives, arguments.limit)
-    strangers = pairing.wrong_pairs(drives, arguments.count, arguments.seed)
-    if not strangers:
-        raise InputError('no wrong pairs: they need two drives, or one longer than '
-                         f'{pairing.NO_OVERLAP_M:g} m; add --world')
-    rows = running.run_pairs(right + strangers, [sgor('SGOR', config)], arguments.seed)
-    thresholds = sorted({*np.arange(0.4, 1.0, 0.05).round(2), config.min_confidence})
-    text = (report.confidence_table(rows, thresholds, config.min_confidence) + '\n\n'
-            f'{len(right)} right and {len(strangers)} wrong pairs. Answers that the default '
-            'threshold refused keep the confidence that they were refused with.')
-    _finish(arguments, text, [asdict(row) for row in rows], len(right), len(strangers))
-    plots.plot_confidence(arguments.output / 'confidence.png', rows, config.min_confidence)
+    methods = [sgor('SGOR', config), sgor('SGOR, no labels', config, labels=False)]
+    names = [method.name for method in methods]
+    kinds = (scene_kinds(arguments.kinds or ())
+             if _wants_world(arguments) and arguments.per_kind else {})
+    rows, texts = [], []
+    if arguments.limit or arguments.count:
+        rows = running.run_pairs(_right_and_wrong(arguments), methods, arguments.seed)
+        labelled = [row for row in rows if row.method == names[0]]
+        thresholds = sorted({*np.arange(0.4, 1.0, 0.05).round(2), config.min_confidence})
+        texts.append(report.confidence_table(labelled, thresholds, config.min_confidence)
+                     + f'\n\n{sum(row.right for row in labelled)} right and '
+                     f'{sum(not row.right for row in labelled)} wrong pairs. Answers that the '
+                     'default threshold refused keep the confidence that they were refused with.')
+    elif not kinds:
+        raise InputError('--limit 0 --count 0: nothing is left to do without --per-kind')
+    for number, kind in enumerate(kinds, 1):
+        _say(f'{kind}, {number} of {len(kinds)} kinds: scanning')
+        rows += running.run_pairs(scene_pairs(kind, arguments.per_kind, arguments.seed), methods,
+                                  arguments.seed)
+    repeating = [kind for kind, repeats in kinds.items() if repeats]
+    texts += [trust.trust_table(rows, names, repeating), trust.RULE,
+              trust.verdicts(rows, names), trust.reliability_table(rows, names)]
+    right = sum(row.right for row in rows) // len(methods)
+    _finish(arguments, '\n\n'.join(texts), [asdict(row) for row in rows], right,
+            len(rows) // len(methods) - right)
+    if arguments.limit or arguments.count:
+        plots.plot_confidence(arguments.output / 'confidence.png', labelled,
+                              config.min_confidence)
+    plot_reliability(arguments.output / 'reliability.png', rows, names, config.min_confidence)
     return 0
 
 
@@ -224,6 +244,16 @@ def _right_pairs(arguments: Namespace, drives: Sequence[Drive], count: int) -> l
         raise InputError(f'{arguments.data or "world"}: no pairs within '
                          f'{arguments.max_distance:g} m; they need poses.txt or pairs.json')
     return pairing.choose(candidates, count, arguments.seed)
+
+
+def _right_and_wrong(arguments: Namespace) -> list[Pair]:
+    drives = _drives(arguments)
+    right = _right_pairs(arguments, drives, arguments.limit) if arguments.limit else []
+    strangers = pairing.wrong_pairs(drives, arguments.count, arguments.seed)
+    if arguments.count and not strangers:
+        raise InputError('no wrong pairs: they need two drives, or one longer than '
+                         f'{pairing.NO_OVERLAP_M:g} m; add --world')
+    return right + strangers
 
 
 def _dense_reference() -> solver.Dense | None:

@@ -22,10 +22,15 @@ def benchmark_parser() -> ArgumentParser:
     one.add_argument('--no-labels', action='store_true', help='also run SGOR without labels')
     one.add_argument('--wrong', type=_count, default=50, help='pairs of different places, to see '
                      'what is accepted of them')
-    two = _add(commands, 'wrong', 'how far confidence tells wrong pairs from right ones')
-    two.add_argument('--count', type=_positive, default=500, help='wrong pairs')
-    for command in (one, two):
-        command.add_argument('--limit', type=_positive, default=300, help='right pairs, chosen at '
+    two = _add(commands, 'wrong', 'what is claimed and wrong: confidence of right '
+               'and wrong pairs, and what becomes of places that repeat themselves')
+    two.add_argument('--count', type=_count, default=500, help='wrong pairs')
+    two.add_argument('--per-kind', type=_count, default=10, metavar='COUNT', help='pairs of the '
+                     'same place, and of different places, of each kind in the built-in world: '
+                     'tunnels, corridors, facades and others that repeat themselves')
+    two.add_argument('--kinds', nargs='+', metavar='KIND', help='of those; default: all')
+    for command, whole in ((one, _positive), (two, _count)):
+        command.add_argument('--limit', type=whole, default=300, help='right pairs, chosen at '
                              'random and evenly over data sets and distances')
     three = _add(commands, 'ablation', 'every mechanism off, one at a time')
     three.add_argument('--pairs', type=_positive, default=200, help='right pairs, likewise')

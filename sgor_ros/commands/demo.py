@@ -22,6 +22,7 @@ from ..io.bags import BagReader
 from ..io.bags import CLOUD_TYPE
 from ..io.messages import matrix_of
 from ..io.messages import stamp_ns_of
+from .world_bag import STREET
 from .world_bag import WorldMap
 from .world_bag import write_world_bag
 
@@ -55,7 +56,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 def _parse(arguments: list[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
-        prog='sgor_demo', description='Write a labelled bag of the built-in street world, play '
+        prog='sgor_demo', description='Write a labelled bag of the built-in world, play '
         'it to sgor_node over DDS in real time, and compare what the node publishes with the '
         'ground truth.', formatter_class=argparse.ArgumentDefaultsHelpFormatter)
     parser.add_argument('--out', type=Path, default=Path('out/demo'),
@@ -66,6 +67,8 @@ def _parse(arguments: list[str] | None) -> argparse.Namespace:
                         'that drive forth and back')
     parser.add_argument('--rate', type=float, default=10.0, help='scans a second')
     parser.add_argument('--seed', type=int, default=0, help='chooses the place and the noise')
+    parser.add_argument('--place', default=STREET, metavar='KIND', help='or tunnel, corridor, '
+                        'facade, garage_half_full, ...: a wrong one lists them all')
     options = parser.parse_args(arguments)
     if options.scans < 2:
         parser.error(f'--scans {options.scans}: at least 2')
@@ -90,7 +93,8 @@ def _run(options: argparse.Namespace) -> int:
         raise InputError(f'--out {out}: {error.strerror}') from error
     _say('starting sgor_node; the first start on a machine compiles, for a minute or two')
     with closing(Domain()) as domain, NodeProcess(domain, out / 'node.log') as node:
-        drive, world = write_world_bag(out / 'bag', min(options.scans, BAG_SCANS), options.seed)
+        drive, world = write_world_bag(out / 'bag', min(options.scans, BAG_SCANS), options.seed,
+                                       options.place)
         with BagReader(out / 'bag') as reader:
             clouds = [cloud.read()[2] for cloud in reader.clouds(reader.find_topic('label'))]
         scans = list(forth_and_back(list(drive), options.scans))

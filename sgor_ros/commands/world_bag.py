@@ -15,7 +15,7 @@ from ..io.messages import point_cloud2
 
 Array = NDArray[np.float64]
 
-SPEED_M_S = 8.0
+STREET, SPEED_M_S = 'street', 8.0
 # zero stands for "no stamp" in ROS
 FIRST_STAMP_NS = 1_000_000_000
 # of the points of every so many scans, every so many are the map
@@ -38,10 +38,12 @@ class WorldMap:
     labels: NDArray[np.uint32]
 
 
-def write_world_bag(path: Path, scans: int, seed: int) -> tuple[dict[int, Array], WorldMap]:
+def write_world_bag(path: Path, scans: int, seed: int, place: str = STREET
+                    ) -> tuple[dict[int, Array], WorldMap]:
     """Drive through the built-in world at 10 Hz and record it, replacing an older bag.
 
-    The clouds are on `points`, the true poses on `ground_truth`.
+    The clouds are on `points`, the true poses on `ground_truth`; `place` is the street or a kind
+    of `world.scenes`.
 
     Returns
     -------
@@ -50,15 +52,19 @@ def write_world_bag(path: Path, scans: int, seed: int) -> tuple[dict[int, Array]
     world : WorldMap
     """
     try:
+        from ..world import scenes
         from ..world import simulate
     except ImportError as error:
         raise InputError(f"the built-in world needs Open3D ({error}): pip install "
                          "'sgor_ros[open3d]'") from error
+    if place != STREET and place not in scenes.KINDS:
+        raise InputError(f'place {place!r}: not one of {STREET}, {", ".join(scenes.KINDS)}')
     print(f'building the world and a bag of {scans} scans: {path}', flush=True)
     shutil.rmtree(path, ignore_errors=True)
     truth: dict[int, Array] = {}
     points_seen, labels_seen = [], []
-    drive = simulate(scans, seed, speed=SPEED_M_S)
+    speed = SPEED_M_S if place == STREET else None
+    drive = simulate(scans, seed, speed=speed, place=place)
     with BagWriter(path) as bag:
         for seconds, points, labels, pose in tqdm(drive, 'recording', scans, unit='scan',
                                                   disable=None):

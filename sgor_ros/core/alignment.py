@@ -64,21 +64,14 @@ def surface(points: NDArray[np.float64], threads: int) -> Surface | None:
     return Surface(cloud, tree, float(np.median(np.linalg.norm(points, axis=1))))
 
 
-def align(source: Surface, target: Surface, T_target_source: NDArray[np.float64], rough: bool,
+def align(source: Surface, target: Surface, T_target_source: NDArray[np.float64],
           config: SgorConfig) -> Alignment:
-    """Refine a transformation by GICP; a rough one starts with twice the reach.
-
-    Parameters
-    ----------
-    rough : bool
-        Whether few correspondences stand behind the transformation.
-    """
-    T = T_target_source
-    for reach in (2 * config.local_reach, config.local_reach)[0 if rough else 1:]:
-        result = small_gicp.align(
-            target.cloud, source.cloud, target.tree, T, registration_type='GICP',
-            max_correspondence_distance=reach, num_threads=config.threads, max_iterations=30)
-        T = np.asarray(result.T_target_source)
+    """Refine a transformation by GICP, from within `local_reach`."""
+    result = small_gicp.align(
+        target.cloud, source.cloud, target.tree, T_target_source, registration_type='GICP',
+        max_correspondence_distance=config.local_reach, num_threads=config.threads,
+        max_iterations=30)
+    T = np.asarray(result.T_target_source)
     pairs = int(result.num_inliers)
     repeated = systematic(T, source.middle_range, config.voxel_size)
     random = noise(np.asarray(result.H), result.error, pairs, T)

@@ -1,5 +1,6 @@
 """The settings of SGOR: one home for each default, with unit, meaning and bounds."""
 from dataclasses import dataclass
+from functools import lru_cache
 import math
 from typing import Self
 
@@ -16,6 +17,11 @@ class SgorConfig(Settings):
     ``docs/method.md``.
     """
 
+    scale: float = setting(
+        0.0, 'All other lengths but max_range are those for streets, and multiplied by this; 0: '
+        'it follows from the scans, 1 for streets, a half for a courtyard and so on (beyond the '
+        'paper)', minimum=0.0, maximum=10.0)
+
     # scan -> semantic-geometric space (Sec. III-B)
     label_convention: str = setting(
         'semantickitti', 'What the label ids mean: semantickitti, semantickitti_train, nuscenes, '
@@ -26,6 +32,9 @@ class SgorConfig(Settings):
         80.0, 'Points farther from the sensor are dropped', 'm', minimum=0.5, maximum=1000.0)
     voxel_size: float = setting(
         0.5, 'Edge of the voxel grid that thins a scan', 'm', minimum=0.01, maximum=10.0)
+    max_voxels: int = setting(
+        40000, 'Voxels of a scan; more are thinned evenly, so that any cloud ends in time',
+        minimum=100, maximum=1000000)
 
     # secondary ground segmentation (Sec. III-B, Eq. 2-3)
     sigma_g: float = setting(
@@ -118,6 +127,9 @@ class SgorConfig(Settings):
     evidence_reach: float = setting(
         0.6, 'Keypoints with one of the same label nearer than this under the result agree', 'm',
         minimum=0.01, maximum=10.0)
+    rival_radius: float = setting(
+        30.0, 'Other placements that explain the scans are looked for so far from the answer; 0: '
+        'not at all (beyond the paper)', 'm', minimum=0.0, maximum=500.0)
     min_confidence: float = setting(
         0.88, 'Results below this confidence are failures; 0: accept all',
         minimum=0.0, maximum=1.0)
@@ -135,6 +147,11 @@ class SgorConfig(Settings):
             raise InputError(f'group_keep = {self.group_keep}: not below '
                              f'group_size = {self.group_size}')
 
+    def scaled(self, scale: float) -> Self:
+        """Return the settings for a space that is `scale` times the size of a street."""
+        scaled: Self = _scaled(self, scale)
+        return scaled
+
     @classmethod
     def outdoor(cls) -> Self:
         """Return the default: a vehicle or robot with a spinning LiDAR."""
@@ -144,16 +161,26 @@ class SgorConfig(Settings):
     def indoor(cls) -> Self:
         """Return a preset for rooms and fragments of a few metres."""
         return cls(
-            min_range=0.0, max_range=20.0, voxel_size=0.05, sigma_g=0.03, normal_radius=0.10,
-            descriptor_radius=0.25, vote_radius=0.10, context_scale=0.15, height_gate=0.0,
-            key_spacing=0.1, sigma_d=0.10, tau_1=0.10, ground_check=False, local_reach=0.10,
-            evidence_reach=0.10)
+            scale=1.0, min_range=0.0, max_range=20.0, voxel_size=0.05, sigma_g=0.03,
+            normal_radius=0.10, descriptor_radius=0.25, vote_radius=0.10, context_scale=0.15,
+            height_gate=0.0, key_spacing=0.1, sigma_d=0.10, tau_1=0.10, ground_check=False,
+            local_reach=0.10, evidence_reach=0.10, rival_radius=5.0)
 
     @classmethod
     def paper(cls) -> Self:
         """Return the paper's steps and nothing besides."""
         return cls(
-            robust_ground=False, drop_ground_labels=False, match_within_labels=False,
+            scale=1.0, robust_ground=False, drop_ground_labels=False, match_within_labels=False,
             unlabelled_attempt=False, height_gate=0.0, context_weight=0.0, moving_vote=True,
             quick_keypoints=0, groups=200, group_size=400, weight_cutoff=6.0, cloud_check=False,
-            refinement_rounds=1, local_refinement=False, min_confidence=0.0)
+            refinement_rounds=1, local_refinement=False, rival_radius=0.0, min_confidence=0.0)
+
+
+@lru_cache(maxsize=32)
+def _scaled[Config: SgorConfig](config: Config, scale: float) -> Config:
+    lengths = {item.name: getattr(config, item.name) * scale for item in config.settings()
+               if item.unit == 'm' and item.name != 'max_range'}
+    bounds = {item.name: (item.minimum, item.maximum) for item in config.settings()}
+    return config.replace(scale=1.0, **{
+        name: min(max(length, bounds[name][0]), bounds[name][1])
+        for name, length in lengths.items()} if scale != 1 else {})

@@ -14,6 +14,7 @@ from .matching.correspondences import given_correspondences
 from .matching.correspondences import match
 from .matching.correspondences import overlap_region
 from .result import Registration
+from .scan.preprocessing import at_scale
 from .scan.preprocessing import preprocess
 from .scan.scan import PreparedScan
 from .scan.scan import SemanticScan
@@ -27,12 +28,11 @@ from .solver.refinement import refine
 from .solver.refinement import unobservable
 from .solver.verification import Normals
 from .solver.verification import verify
-from .trust.acceptance import judge
+from .trust.acceptance import compete
 from .trust.acceptance import judge_matches
-from .trust.evidence import View
-
-FEW_INLIERS = 50
-"""With fewer the fit is off by decimetres at the far end of a scan."""
+from .trust.acceptance import settle
+from .trust.rivals import Contest
+from .trust.view import View
 
 
 def register(source: SemanticScan | PreparedScan, target: SemanticScan | PreparedScan,
@@ -62,42 +62,50 @@ def _register(source: SemanticScan | PreparedScan, target: SemanticScan | Prepar
     with clock('preprocessing'):
         source = source if isinstance(source, PreparedScan) else preprocess(source, config)
         target = target if isinstance(target, PreparedScan) else preprocess(target, config)
-    if (source.scan.labels is None) != (target.scan.labels is None):
-        source, target = _without_labels(source), _without_labels(target)
-    for attempt in _attempts(config, labelled=source.scan.labels is not None):
-        result = _globally(source, target, attempt, clock)
+        if source.scale != target.scale:    # the coarser one costs less and sees farther
+            source, target = (at_scale(scan, max(source.scale, target.scale))
+                              for scan in (source, target))
+    config = config.scaled(source.scale)
+    labelled = (source.features.labelled_share > 0, target.features.labelled_share > 0)
+    doubtful = source.scale < 1 and any(
+        scan.ground is None or scan.ground.source == 'geometry' for scan in (source, target))
+    for attempt in _attempts(config, labelled=all(labelled), level=not doubtful):
+        result, contest = _globally(source, target, attempt, clock)
         if result.success:
             break
-    with clock('alignment'):
-        result = _locally(result, source, target, config)
+    if result.success and contest is not None:
+        result = _locally(result, contest, source, target, config, clock)
+    warnings = (*(f'source: {w}' for w in source.warnings),
+                *(f'target: {w}' for w in target.warnings))
+    if any(labelled) and not all(labelled):
+        warnings += (f'labels ignored: the {"target" if labelled[0] else "source"} has none',)
     return replace(result, source_ground=source.ground, target_ground=target.ground,
-                   warnings=(*(f'source: {w}' for w in source.warnings),
-                             *(f'target: {w}' for w in target.warnings)))
+                   warnings=warnings)
 
 
-def _without_labels(prepared: PreparedScan) -> PreparedScan:
-    """Prepare a scan again without the labels that the other scan has not."""
-    if prepared.scan.labels is None:
-        return prepared
-    again = preprocess(SemanticScan(prepared.scan.points), prepared.config)
-    return replace(again, warnings=('labels ignored: the other scan has none', *again.warnings))
+def _attempts(config: SgorConfig, *, labelled: bool, level: bool) -> Iterator[SgorConfig]:
+    """Yield the settings of a quick attempt with few keypoints, of all, and without labels.
 
-
-def _attempts(config: SgorConfig, *, labelled: bool) -> Iterator[SgorConfig]:
-    """Yield the settings of a quick attempt with few keypoints, of all, and without labels."""
+    Where the ground planes may be of walls or tables, each again with whatever is level.
+    """
+    if not labelled:
+        config = config.replace(semantics='none')
+    tilted = config.replace(ground_check=False, height_gate=0.0, context_weight=0.0)
+    ways = (config,) if level or config == tilted else (config, tilted)
     if 0 < config.quick_keypoints < config.max_correspondences:
-        yield config.replace(max_correspondences=config.quick_keypoints,
-                             groups=min(config.groups, config.quick_groups),
-                             group_size=max(config.quick_keypoints // 8, config.group_keep + 1))
-    yield config
+        for way in ways:
+            yield way.replace(max_correspondences=config.quick_keypoints,
+                              groups=min(config.groups, config.quick_groups),
+                              group_size=max(config.quick_keypoints // 8, config.group_keep + 1))
+    yield from ways
     # without labels it would be the same attempt again
-    if labelled and config.unlabelled_attempt and config.semantics != 'none':
+    if config.unlabelled_attempt and config.semantics != 'none':
         yield config.replace(semantics='none')
 
 
 def _globally(source: PreparedScan, target: PreparedScan, config: SgorConfig,
-              clock: Stopwatch) -> Registration:
-    """Match, solve, and ask the clouds whether to believe it (Sec. III-B to III-E)."""
+              clock: Stopwatch) -> tuple[Registration, Contest | None]:
+    """Match, solve, and let the clouds choose among the answer and its rivals."""
     with clock('matching'):
         p, q = source.features, target.features
         if config.correspondence_preprocessing and config.semantics != 'none':
@@ -106,23 +114,23 @@ def _globally(source: PreparedScan, target: PreparedScan, config: SgorConfig,
     normals = (None if source.ground is None or target.ground is None
                else (source.ground.normal, target.ground.normal))
     result = solve(correspondences, normals, (source.view, target.view), config, clock)
-    with clock('acceptance'):
-        return judge(result, source.view, target.view, source.view.cell, config)
+    with clock('rivals'):
+        return compete(result, source.view, target.view, config)
 
 
-def _locally(result: Registration, source: PreparedScan, target: PreparedScan,
-             config: SgorConfig) -> Registration:
-    """Refine on the clouds and judge again, now by near partners (beyond the paper)."""
-    if not result.success or result.T_target_source is None:
-        return result
+def _locally(result: Registration, contest: Contest, source: PreparedScan, target: PreparedScan,
+             config: SgorConfig, clock: Stopwatch) -> Registration:
+    """Refine on the clouds, and judge again beside the rivals (beyond the paper)."""
+    assert result.T_target_source is not None
     if source.surface is not None and target.surface is not None:
-        local = align(source.surface, target.surface, result.T_target_source,
-                      bool(result.inliers.sum() < FEW_INLIERS), config)
+        with clock('alignment'):
+            local = align(source.surface, target.surface, result.T_target_source, config)
         agree = distances(local.T_target_source, result.source_points,
                           result.target_points) < config.tau_1
         result = replace(result, T_target_source=local.T_target_source,
                          covariance=local.covariance, systematic=local.systematic, inliers=agree)
-    return judge(result, source.view, target.view, config.evidence_reach, config)
+    with clock('acceptance'):
+        return settle(result, contest, source.view, target.view, config)
 
 
 def register_correspondences(source_points: ArrayLike, target_points: ArrayLike,
@@ -174,7 +182,8 @@ def solve(correspondences: Correspondences, ground_normals: Normals | None,
     with clock('verification'):
         verdict = verify(hypotheses, correspondences, ground_normals, views, config)
     found = replace(found, hypotheses=hypotheses.T_target_source,
-                    passed_ground_check=verdict.passed_ground_check, best_hypothesis=verdict.best)
+                    passed_ground_check=verdict.passed_ground_check, best_hypothesis=verdict.best,
+                    hypothesis_scores=verdict.score)
     if verdict.best < 0:
         return replace(found, reason=verdict.reason)
     with clock('refinement'):

@@ -64,6 +64,8 @@ class Registration:
         Candidates of the groups, T_target_source.
     passed_ground_check : (H,) bool
         Which of them survived the first stage of verification.
+    hypothesis_scores : (H,) float64
+        What they were chosen by, the higher the better; minus infinity where the check failed.
     best_hypothesis : int
         Which of them won the second stage; -1 if none.
     source_ground, target_ground : Ground or None
@@ -88,6 +90,7 @@ class Registration:
     alternatives: tuple[Placement, ...] = ()
     hypotheses: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 4, 4)))
     passed_ground_check: NDArray[np.bool_] = field(default_factory=lambda: np.empty(0, np.bool_))
+    hypothesis_scores: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
     best_hypothesis: int = -1
     source_ground: Ground | None = None
     target_ground: Ground | None = None

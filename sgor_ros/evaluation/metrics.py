@@ -4,11 +4,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+from scipy.stats import chi2
 
 from ..core.common import se3
 from ..core.common.settings import InputError
 
 Array = NDArray[np.float64]
+
+THREE_SIGMA = float(chi2.ppf(0.9973, 6))
+"""The NEES of a pose stays below in as many cases as a number stays within 3 sigma."""
 
 KITTI_LENGTHS_M = (100.0, 200.0, 300.0, 400.0, 500.0, 600.0, 700.0, 800.0)
 """Lengths over which the KITTI benchmark measures drift."""
@@ -24,6 +29,36 @@ def translation_error_m(T_estimate: ArrayLike, T_truth: ArrayLike) -> float:
     """Return TE, the distance of the translations of (4, 4) transformations, metres."""
     estimate, truth = np.asarray(T_estimate, np.float64), np.asarray(T_truth, np.float64)
     return float(np.linalg.norm(estimate[:3, 3] - truth[:3, 3]))
+
+
+def squared_normalised_error(T_estimate: ArrayLike, T_truth: ArrayLike,
+                             covariance: ArrayLike | None) -> float:
+    """Return NEES: how far off an estimate is, measured by its own covariance.
+
+    Parameters
+    ----------
+    T_estimate, T_truth : (4, 4) array
+        T_target_source.
+    covariance : (6, 6) array or None
+        As of `Registration`.
+
+    Returns
+    -------
+    float
+        Squared Mahalanobis distance: 6 on average where the covariance is right; infinite where
+        it claims that there is no error at all in some direction, NaN without one.
+    """
+    if covariance is None:
+        return float('nan')
+    estimate, truth = np.asarray(T_estimate, np.float64), np.asarray(T_truth, np.float64)
+    turn = Rotation.from_matrix(truth[:3, :3] @ estimate[:3, :3].T).as_rotvec()
+    error = np.concatenate((truth[:3, 3] - estimate[:3, 3], turn))
+    try:
+        root = np.linalg.cholesky(np.asarray(covariance, np.float64))
+    except np.linalg.LinAlgError:
+        return float('inf')
+    whitened = np.linalg.solve(root, error)
+    return float(whitened @ whitened)
 
 
 @dataclass(frozen=True)

@@ -173,13 +173,18 @@ def _sensor_poses(path: Path) -> Array:
     return np.asarray(se3.inverse(T_camera_sensor) @ poses @ T_camera_sensor)
 
 
+def frame_in_memory(name: str, data_set: str, points: NDArray[np.float32],
+                    labels: NDArray[np.uint32]) -> Frame:
+    """Describe a scan in memory: points (N, 3), raw SemanticKITTI labels (N,)."""
+    return Frame(name, data_set, 'semantickitti', partial(SemanticScan, points, labels))
+
+
 def drive_of(name: str, scans: Iterable[tuple[NDArray[np.float32], NDArray[np.uint32], Array]]
              ) -> Drive:
     """Make a drive of scans in memory: points, raw SemanticKITTI labels, T_world_sensor."""
     frames, poses = [], []
     for index, (points, labels, T_world_sensor) in enumerate(scans):
-        frames.append(Frame(f'{name}/{index:06d}', 'world', 'semantickitti',
-                            partial(SemanticScan, points, labels)))
+        frames.append(frame_in_memory(f'{name}/{index:06d}', 'street', points, labels))
         poses.append(T_world_sensor)
     return Drive(name, frames, np.array(poses))
 

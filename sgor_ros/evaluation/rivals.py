@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.common import se3
+from ..core.result import Registration
 
 Array = NDArray[np.float64]
 Points = NDArray[np.float32]
@@ -27,6 +28,8 @@ class Answer(NamedTuple):
         By what it judged: confidence, inliers or fitness.
     seconds_one_new : float
         With one of the scans prepared before; NaN where a method cannot do that.
+    result : Registration or None
+        All that SGOR said; None for rivals.
     """
 
     T_target_source: Array | None
@@ -34,6 +37,7 @@ class Answer(NamedTuple):
     valid: bool
     score: float
     seconds_one_new: float = float('nan')
+    result: Registration | None = None
 
 
 def kiss_matcher(source: Points, target: Points, voxel_m: float) -> Answer:

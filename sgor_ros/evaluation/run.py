@@ -22,6 +22,7 @@ from ..core.registration import register
 from ..core.scan.preprocessing import preprocess
 from ..core.scan.scan import SemanticScan
 from .metrics import rotation_error_deg
+from .metrics import squared_normalised_error
 from .metrics import translation_error_m
 from .pairs import Pair
 from .pairs import random_labels
@@ -71,7 +72,11 @@ class Method:
 
 @dataclass(frozen=True)
 class Row:
-    """What one method made of one pair; RE in degrees, TE in metres, NaN without an answer."""
+    """What one method made of one pair; RE in degrees, TE in metres, NaN without an answer.
+
+    The last four are what SGOR alone says: confidence, count of degenerate directions and of
+    alternatives, and the error measured by the covariance.
+    """
 
     method: str
     data_set: str
@@ -86,6 +91,10 @@ class Row:
     score: float
     seconds: float
     seconds_one_new: float
+    confidence: float = float('nan')
+    degenerate: int = 0
+    alternatives: int = 0
+    nees: float = float('nan')
 
     @property
     def success(self) -> bool:
@@ -120,7 +129,7 @@ def _sgor(sample: Sample, config: SgorConfig, label_noise: float, *, labels: boo
     # what was refused for another reason has no threshold that would let it pass
     other_reason = not result.success and result.confidence >= config.min_confidence
     return Answer(result.T_target_source, end - begin, result.success,
-                  0.0 if other_reason else result.confidence, end - one_ready)
+                  0.0 if other_reason else result.confidence, end - one_ready, result)
 
 
 def _spoiled(labels: NDArray[np.int64] | None, share: float, rng: np.random.Generator
@@ -190,16 +199,21 @@ def run_pairs(pairs: Sequence[Pair], methods: Sequence[Method], seed: int) -> li
 
 
 def _judged(method: str, pair: Pair, truth: Array | None, answer: Answer) -> Row:
-    re, te = float('nan'), float('nan')
+    re = te = nees = float('nan')
+    result = answer.result
     T = answer.T_target_source
     if truth is not None and T is not None and np.isfinite(T).all():
         known = np.array([1.0, 1.0, float(pair.heights_known), 1.0])[:, None]
         re = rotation_error_deg(T, truth)
         te = translation_error_m(*(known * np.asarray(each) for each in (T, truth)))
+        if result is not None and pair.heights_known:
+            nees = squared_normalised_error(T, truth, result.covariance)
+    trust = ((float('nan') if T is None else result.confidence, len(result.degenerate),
+              len(result.alternatives), nees) if result is not None else ())
     return Row(method, pair.data_set, pair.source.name, pair.target.name, pair.right,
                pair.distance_m, re, te, re < MAX_RE_DEG and te < MAX_TE_M,
                answer.valid and T is not None, answer.score, answer.seconds,
-               answer.seconds_one_new)
+               answer.seconds_one_new, *trust)
 
 
 def peak_memory_mb(methods: Iterable[Method], sample: Sample) -> dict[str, float]:

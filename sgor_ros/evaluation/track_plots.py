@@ -17,11 +17,12 @@ Array = NDArray[np.float64]
 TRUTH, ESTIMATE, LIMIT, LOST, SURE = '#111111', '#ff5a1f', '#888888', '#c1121f', '#2a9d5c'
 # raw SemanticKITTI ids: name, colour; drawn in this order
 CLASSES = {
-    72: ('terrain', '#dfe9d3'), 40: ('road', '#c9c9cf'), 48: ('sidewalk', '#e6d9e2'),
+    72: ('terrain', '#dfe9d3'), 40: ('road', '#c9c9cf'), 44: ('parking', '#c9c9cf'),
+    48: ('sidewalk', '#e6d9e2'), 49: ('floor', '#c9c9cf'), 52: ('structure', '#a9b7bd'),
     50: ('building', '#8a7462'), 51: ('fence', '#c49a6c'), 70: ('vegetation', '#74a65a'),
     71: ('trunk', '#6b4a2b'), 10: ('car', '#3d7dc4'), 80: ('pole', '#b33c86'),
     81: ('traffic sign', '#e0457b'), 99: ('other', '#777777')}
-GROUND = (72, 40, 48)
+GROUND = (72, 40, 44, 48, 49)
 MARGIN_M = 22.0
 # of the longer side, so that a straight drive is no picture of one line's height
 SQUARE_MARGIN = 0.05

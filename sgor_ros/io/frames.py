@@ -72,8 +72,8 @@ class _Start:
     covariance: Array
 
 
-class Placement:
-    """Where the poses of a track are published: the node's and the replay's way is one.
+class OdomFrame:
+    """The frame that poses are published in, and where each track lies in it.
 
     The frame that is published, base or sensor, begins a track at the origin of the odom frame,
     or where `begin_at` says.

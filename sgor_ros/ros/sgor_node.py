@@ -159,7 +159,7 @@ class SgorNode(Node):
         self._tracker.config, self._tracker.tracker_config = self._settings.live
         reset, start = self._commands.take()
         if start is not None:
-            self._outputs.placement.begin_at(*start)
+            self._outputs.odom_frame.begin_at(*start)
         if reset:
             self._tracker.reset()
         label_field = self._config.label_field

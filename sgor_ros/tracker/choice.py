@@ -116,7 +116,7 @@ def refined(placement: Placement, source: PreparedScan, target: PreparedScan,
     """Return a placement refined on the clouds; what is unknown of it stays unknown."""
     if source.surface is None or target.surface is None:
         return placement
-    local = align(source.surface, target.surface, placement.T_target_source, False, config)
+    local = align(source.surface, target.surface, placement.T_target_source, config)
     return replace(placement, T_target_source=local.T_target_source, covariance=(
         placement.covariance if _is_loose(placement) else local.covariance))
 

@@ -83,7 +83,9 @@ class Tracker:
             warnings = [f'time ran backwards by {(before_ns - stamp_ns) * 1e-9:.3f} s: a new '
                         'track begins']
             self._forget()
-        prepared = preprocess(scan, self.config)
+        prepared = preprocess(
+            scan, self.config,
+            scale_before=self._reference.prepared.scale if self._reference else None)
         new = _Scan(prepared, stamp_ns, [*warnings, *prepared.warnings], dict(prepared.timings))
         if self._reference is None:
             return self._begin(new)

@@ -1,4 +1,4 @@
-"""A labelled street world, scanned by a simulated LiDAR, that needs no download."""
+"""A labelled world, scanned by a simulated LiDAR, that needs no download."""
 
 from __future__ import annotations
 
@@ -7,23 +7,27 @@ from collections.abc import Iterator
 import numpy as np
 import numpy.typing as npt
 
+from . import scenes
 from .lidar import Lidar
 from .scene import Scene
-from .scene import street_scene
-from .trajectory import loop_trajectory
+from .street import loop_trajectory
+from .street import street_scene
 
-__all__ = ['Lidar', 'Scene', 'loop_trajectory', 'simulate', 'street_scene']
+__all__ = ['STREET', 'Lidar', 'Scene', 'loop_trajectory', 'scenes', 'simulate', 'street_scene']
 
+STREET = 'street'
 _LIDAR = Lidar()
 _PERIOD = 0.1  # s
+_SPEED = 6.0  # m/s
 
 
 def simulate(
-    n_scans: int, seed: int = 0, lidar: Lidar = _LIDAR, speed: float = 6.0,
+    n_scans: int, seed: int = 0, lidar: Lidar = _LIDAR, speed: float | None = None,
+    place: str = STREET,
 ) -> Iterator[tuple[
     float, npt.NDArray[np.float32], npt.NDArray[np.uint32], npt.NDArray[np.float64],
 ]]:
-    """Drive around the place of a seed and scan it ten times a second.
+    """Drive through the place of a seed and scan it ten times a second.
 
     Parameters
     ----------
@@ -33,8 +37,10 @@ def simulate(
         Chooses the place and the noise; the same seed gives the same scans.
     lidar : Lidar
         The sensor.
-    speed : float
-        Speed, m/s.
+    speed : float, optional
+        Speed, m/s; if not given 6 on the street, and what a kind of place is made for.
+    place : str
+        'street', or one of `scenes.KINDS`.
 
     Yields
     ------
@@ -47,8 +53,15 @@ def simulate(
     T_world_sensor : (4, 4) array
         True pose of the sensor, translation in m.
     """
-    scene = street_scene(seed)
     rng = np.random.default_rng([seed, 1])
-    for index, pose in enumerate(loop_trajectory(scene, n_scans, speed, _PERIOD)):
+    scene: Scene
+    if place == STREET:
+        scene = street = street_scene(seed)
+        poses = loop_trajectory(street, n_scans, _SPEED if speed is None else speed, _PERIOD)
+    else:
+        scene = there = scenes.make(place, seed)
+        step = scenes.KINDS[place].step if speed is None else speed * _PERIOD
+        poses = scenes.drive(there, n_scans, step)
+    for index, pose in enumerate(poses):
         points, labels = lidar.scan(scene, pose, rng)
         yield index * _PERIOD, points, labels, pose

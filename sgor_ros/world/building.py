@@ -51,6 +51,12 @@ def house(rng: np.random.Generator, width: float, depth: float, storeys: int) ->
     return np.concatenate(parts)
 
 
+def house_front(rng: np.random.Generator, width: float, storeys: int) -> Array:
+    """Draw the front of a house only, as `house` does; triangles (K, 3, 3), m."""
+    ground, upper = rng.uniform(2.9, 3.8), rng.uniform(2.6, 3.1)
+    return _front(rng, width, np.concatenate([[0.0], ground + upper * np.arange(storeys)]))
+
+
 def _heights(floors: Array) -> Array:
     """Panel borders in height: footing, then sill, lintel and ceiling of each storey."""
     rows = [[floor + _SILL, floor + _LINTEL, ceiling]

@@ -18,6 +18,10 @@ from ..scan.labels import LabelConvention
 from ..scan.labels import UNLABELLED
 from ..scan.neighbours import radius_neighbours
 from ..scan.voxels import one_point_voxels
+from ..scan.voxels import thin
+
+MOST_COMPARISONS = 150_000_000
+"""Pairs of descriptors, some tenths of a second; beyond it fewer source keypoints are matched."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,11 +77,15 @@ def given_correspondences(source_points: ArrayLike, target_points: ArrayLike,
 
 
 def overlap_region(source: Features, target: Features) -> tuple[Features, Features]:
-    """Keep the classes that both scans have (Eq. 4); unlabelled points stay."""
-    shared = (np.bincount(source.labels, minlength=256) > 0)
-    shared &= (np.bincount(target.labels, minlength=256) > 0)
-    shared[UNLABELLED] = True
-    p, q = shared[source.labels], shared[target.labels]
+    """Keep the classes that both scans have (Eq. 4); unlabelled points stay.
+
+    A class that one scan lacks stays too where its points may be hidden among the unlabelled.
+    """
+    p_count, q_count = (np.bincount(f.labels, minlength=256) for f in (source, target))
+    p = ((q_count > 0) | (p_count <= q_count[UNLABELLED]))[source.labels]
+    q = ((p_count > 0) | (q_count <= p_count[UNLABELLED]))[target.labels]
+    p |= source.labels == UNLABELLED
+    q |= target.labels == UNLABELLED
     return source if p.all() else source[p], target if q.all() else target[q]
 
 
@@ -96,36 +104,59 @@ def match(source: Features, target: Features, config: SgorConfig) -> Corresponde
         raise InputError(f'descriptors: source has {source.descriptors.shape[1]} columns, target '
                          f'{target.descriptors.shape[1]}')
     source = source[thin(len(source.points), config.max_correspondences)]
-    if source.heights is None or target.heights is None:
-        source_heights, target_heights = np.zeros(len(source.points)), np.zeros(len(target.points))
-    else:
-        source_heights, target_heights = source.heights, target.heights
-    gate = config.height_gate if config.height_gate > 0 else np.inf
     within = config.match_within_labels and config.semantics != 'none'
-    block = target.regional if within else np.zeros_like(target.regional)
-    wanted = source.regional if within else np.zeros_like(source.regional)
-    # sorted by label, then height, the candidates of a point stand in one run
-    order = np.lexsort((target_heights, block))
-    sorted_block, sorted_heights = block[order], target_heights[order]
     described, candidates = _joint_descriptors(source, target, config)
-    first, last = np.zeros(len(source.points), np.int64), np.zeros(len(source.points), np.int64)
-    for label in np.unique(wanted):
-        low, high = np.searchsorted(sorted_block, [label, int(label) + 1])
-        rows = wanted == label
-        run = sorted_heights[low:high]
-        first[rows] = low + np.searchsorted(run, source_heights[rows] - gate)
-        last[rows] = low + np.searchsorted(run, source_heights[rows] + gate, side='right')
-    nearest = _nearest_in_runs(described, candidates[order], first, last)
+    nearest = np.full(len(source.points), -1, np.int64)
+    # what has no label matches everything, and everything what has none
+    free = (source.regional == UNLABELLED) if within else np.ones(len(nearest), np.bool_)
+    for rows, by_label in ((np.flatnonzero(free), False), (np.flatnonzero(~free), True)):
+        if rows.size:
+            order, first, last = _runs(source[rows], target, by_label, config)
+            asked = thin(len(rows), _affordable(first, last))
+            rows, first, last = rows[asked], first[asked], last[asked]
+            found = _nearest_in_runs(described[rows], candidates[order], first, last)
+            nearest[rows[found >= 0]] = order[found[found >= 0]]
     found = np.flatnonzero(nearest >= 0)
-    s, t = source[found], target[order[nearest[found]]]
+    s, t = source[found], target[nearest[found]]
     return Correspondences(s.points, t.points, s.labels, t.labels, s.regional, t.regional)
 
 
-def thin(count: int, most: int) -> NDArray[np.intp]:
-    """Return at most `most` of the indices 0 to count - 1, evenly spread."""
-    if count <= most:
-        return np.arange(count)
-    return np.linspace(0, count - 1, most).astype(np.intp)
+def _affordable(first: NDArray[np.int64], last: NDArray[np.int64]) -> int:
+    """Return how many of (N, R) runs can be searched, taken evenly, by `MOST_COMPARISONS`."""
+    comparisons = int((last - first).sum())
+    return len(first) * MOST_COMPARISONS // max(comparisons, MOST_COMPARISONS)
+
+
+def _runs(source: Features, target: Features, by_label: bool, config: SgorConfig
+          ) -> tuple[NDArray[np.intp], NDArray[np.int64], NDArray[np.int64]]:
+    """Return the target in an order in which the candidates of a source point stand in runs.
+
+    Returns
+    -------
+    order : (V,) int
+        Sorted by label, if it counts, then height.
+    first, last : (N, R) int64
+        Runs of each source point in that order, one of its label and one without a label.
+    """
+    if source.heights is None or target.heights is None:
+        heights, target_heights = np.zeros(len(source.points)), np.zeros(len(target.points))
+    else:
+        heights, target_heights = source.heights, target.heights
+    gate = config.height_gate if config.height_gate > 0 else np.inf
+    block = target.regional if by_label else np.zeros_like(target.regional)
+    wanted = source.regional if by_label else np.zeros_like(source.regional)
+    order = np.lexsort((target_heights, block))
+    sorted_block, sorted_heights = block[order], target_heights[order]
+    first = np.zeros((len(wanted), 2 if by_label else 1), np.int64)
+    last = np.zeros_like(first)
+    for label in np.unique(wanted):
+        rows = np.flatnonzero(wanted == label)
+        for run, of in enumerate((label, UNLABELLED)[:first.shape[1]]):
+            low, high = np.searchsorted(sorted_block, [of, int(of) + 1])
+            sorted_run = sorted_heights[low:high]
+            first[rows, run] = low + np.searchsorted(sorted_run, heights[rows] - gate)
+            last[rows, run] = low + np.searchsorted(sorted_run, heights[rows] + gate, side='right')
+    return order, first, last
 
 
 def _joint_descriptors(source: Features, target: Features, config: SgorConfig
@@ -153,18 +184,19 @@ def _voted(points: NDArray[np.float64], ids: NDArray[np.int64], convention: Labe
 
 @numba.njit(cache=True, nogil=True, parallel=True, fastmath=True)
 def _nearest_in_runs(source, target, first, last):  # type: ignore[no-untyped-def]
-    """Return for each source row the nearest target row of its run, -1 for an empty run."""
+    """Return for each source row the nearest target row of its runs, -1 for empty ones."""
     nearest = np.empty(len(source), np.int64)
     for i in numba.prange(len(source)):
         best = np.float32(np.inf)
         at = -1
-        for j in range(first[i], last[i]):
-            distance = np.float32(0.0)
-            for d in range(source.shape[1]):
-                gap = source[i, d] - target[j, d]
-                distance += gap * gap
-            if distance < best:
-                best = distance
-                at = j
+        for run in range(first.shape[1]):
+            for j in range(first[i, run], last[i, run]):
+                distance = np.float32(0.0)
+                for d in range(source.shape[1]):
+                    gap = source[i, d] - target[j, d]
+                    distance += gap * gap
+                if distance < best:
+                    best = distance
+                    at = j
         nearest[i] = at
     return nearest

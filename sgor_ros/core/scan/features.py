@@ -4,6 +4,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .labels import UNLABELLED
+
 
 @dataclass(frozen=True, eq=False)
 class Features:
@@ -29,6 +31,11 @@ class Features:
     descriptors: NDArray[np.float32]
     heights: NDArray[np.float64] | None = None
     context: NDArray[np.float32] | None = None
+
+    @property
+    def labelled_share(self) -> float:
+        """The share of the keypoints whose neighbourhood has a label; 0 without keypoints."""
+        return float(np.count_nonzero(self.regional != UNLABELLED)) / max(len(self.regional), 1)
 
     def __getitem__(self, rows: NDArray[np.intp] | NDArray[np.bool_]) -> 'Features':
         return Features(self.points[rows], self.labels[rows], self.regional[rows],

@@ -11,6 +11,10 @@ from .voxels import VoxelCloud
 TRIALS, SAMPLE, SEED = 200, 1000, 0
 """Planes tried by RANSAC, and points asked about each."""
 
+UPRIGHT, LEAST_GROUND = np.cos(np.radians(30.0)), 0.05
+"""A plane across the sensor's z axis, by this cosine, is the ground before any wall or ceiling is,
+if it holds this share of the points near the sensor."""
+
 
 @dataclass(frozen=True)
 class Ground:
@@ -110,6 +114,9 @@ def _by_consensus(points: NDArray[np.float64], candidates: NDArray[np.float64],
     score = ((np.abs(heights) < config.sigma_g).sum(axis=0)
              - 3 * (heights < -2 * config.sigma_g).sum(axis=0))
     score[length[:, 0] == 0] = 0
+    upright = normals[:, 2] > UPRIGHT
+    if source == 'geometry' and score[upright].max(initial=0) >= len(sample) * LEAST_GROUND:
+        score[~upright] = 0
     best = int(np.argmax(score))
     normal, offset = normals[best], float(offsets[best])
     near = np.abs(candidates @ normal + offset) < config.sigma_g

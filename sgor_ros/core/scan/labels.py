@@ -17,6 +17,14 @@ from ..common.settings import InputError
 UNLABELLED = 0
 """The class inside of everything without a label; it votes for nothing."""
 
+
+
+def labels_agree(a: NDArray[np.uint8], b: NDArray[np.uint8]) -> NDArray[np.bool_]:
+    """Return where classes (N,) are the same, as far as both are known."""
+    agree: NDArray[np.bool_] = (a == b) | (a == UNLABELLED) | (b == UNLABELLED)
+    return agree
+
+
 _HOME = Path(__file__).resolve()
 # beside a checkout's package, or under the prefix that it was installed to
 _TABLES = (_HOME.parents[3] / 'config/labels',

@@ -7,6 +7,9 @@ from numpy.typing import NDArray
 
 MAX_CELLS = 250_000
 """Bound on the search grid: beyond it empty cells would cost more than longer candidate lists."""
+MOST_CANDIDATES = 20_000_000
+"""Pairs of points to look at, some tenths of a second. Beyond it, as no surface of a scan is, of a
+point's candidates every second, third or so is looked at."""
 TASKS = 64
 """Pieces of a search that threads share."""
 
@@ -33,6 +36,8 @@ class Neighbours:
 def radius_neighbours(points: NDArray[np.float64], radius: float) -> Neighbours:
     """Find for every point all points of the same cloud within `radius` metres.
 
+    In a cloud denser than any scan, see `MOST_CANDIDATES`, an even share of them.
+
     Parameters
     ----------
     points : (V, 3) float64
@@ -54,7 +59,9 @@ def radius_neighbours(points: NDArray[np.float64], radius: float) -> Neighbours:
     first = np.zeros(np.prod(shape) + 1, np.uint32)
     np.cumsum(np.bincount(cells, minlength=np.prod(shape)), out=first[1:])
     columns = np.ascontiguousarray(points[order].T)
-    grid = columns, cells[order], order, first, shape[1], shape[2], radius * radius
+    cells = cells[order]
+    step = -(-_candidates(cells, first, shape[1], shape[2]) // MOST_CANDIDATES)
+    grid = columns, cells, order, first, shape[1], shape[2], radius * radius, step
     start = np.zeros(len(points) + 1, np.uint64)
     _count(*grid, start)
     np.cumsum(start, out=start)
@@ -64,25 +71,43 @@ def radius_neighbours(points: NDArray[np.float64], radius: float) -> Neighbours:
     return Neighbours(start, index, squared)
 
 
+@numba.njit(cache=True, nogil=True)
+def _candidates(cells, first, ny, nz):  # type: ignore[no-untyped-def]
+    """Return the pairs of points in cells that touch each other."""
+    total = np.int64(0)
+    for cell in cells:
+        for dx in range(-1, 2):
+            for dy in range(-1, 2):
+                row = cell + (dx * ny + dy) * nz
+                total = total + np.int64(first[row + 2]) - np.int64(first[row - 1])
+    return total
+
+
 @numba.njit(cache=True, nogil=True, parallel=True)
-def _count(columns, cells, order, first, ny, nz, limit, start):  # type: ignore[no-untyped-def]
+def _count(columns, cells, order, first, ny, nz, limit, step,  # type: ignore[no-untyped-def]
+           start):
     for at in numba.prange(len(order)):
         x, y, z = columns[:, at]
         found = 0
         for dx in range(-1, 2):
             for dy in range(-1, 2):
                 row = cells[at] + (dx * ny + dy) * nz
-                # slices let the compiler use vectors
-                run = columns[:, first[row - 1]:first[row + 2]]
-                for j in range(run.shape[1]):
-                    a, b, c = run[0, j] - x, run[1, j] - y, run[2, j] - z
-                    found += a * a + b * b + c * c <= limit
-        start[order[at] + 1] = found
+                if step == 1:
+                    # slices let the compiler use vectors
+                    run = columns[:, first[row - 1]:first[row + 2]]
+                    for j in range(run.shape[1]):
+                        a, b, c = run[0, j] - x, run[1, j] - y, run[2, j] - z
+                        found += a * a + b * b + c * c <= limit
+                else:
+                    for j in range(first[row - 1], first[row + 2], step):
+                        a, b, c = columns[0, j] - x, columns[1, j] - y, columns[2, j] - z
+                        found += (a * a + b * b + c * c <= limit) & (j != at)
+        start[order[at] + 1] = found + (step > 1)    # and itself
 
 
 @numba.njit(cache=True, nogil=True, parallel=True)
-def _fill(columns, cells, order, first, ny, nz, limit, start,  # type: ignore[no-untyped-def]
-          index, squared):
+def _fill(columns, cells, order, first, ny, nz, limit, step,  # type: ignore[no-untyped-def]
+          start, index, squared):
     longest = np.diff(start).max() + 1
     for task in numba.prange(TASKS):
         # room for one candidate more than stay: every candidate is written, without a branch
@@ -95,7 +120,8 @@ def _fill(columns, cells, order, first, ny, nz, limit, start,  # type: ignore[no
             for dx in range(-1, 2):
                 for dy in range(-1, 2):
                     row = cells[at] + (dx * ny + dy) * nz
-                    for j in range(np.uint64(first[row - 1]), np.uint64(first[row + 2])):
+                    for j in range(np.uint64(first[row - 1]), np.uint64(first[row + 2]),
+                                   np.uint64(step)):
                         a, b, c = columns[0, j] - x, columns[1, j] - y, columns[2, j] - z
                         d = a * a + b * b + c * c
                         near[found], gap[found] = order[j], d

@@ -12,7 +12,7 @@ from ..common.settings import InputError
 from ..common.stopwatch import Stopwatch
 from ..common.threads import cores
 from ..config import SgorConfig
-from ..trust.evidence import view
+from ..trust.view import view
 from .context import context_classes
 from .context import semantic_context
 from .descriptors import fpfh
@@ -26,8 +26,12 @@ from .labels import label_convention
 from .labels import LabelConvention
 from .labels import UNLABELLED
 from .neighbours import radius_neighbours
+from .scale import scale_of
+from .scale import STREET_VOXEL
+from .scan import Given
 from .scan import PreparedScan
 from .scan import SemanticScan
+from .voxels import thin
 from .voxels import voxel_grid
 from .voxels import VoxelCloud
 
@@ -36,8 +40,8 @@ UNKNOWN_TOLD = 5
 
 
 def preprocess(scan: SemanticScan, config: SgorConfig | None = None, *,
-               keypoints: ArrayLike | None = None,
-               descriptors: ArrayLike | None = None) -> PreparedScan:
+               keypoints: ArrayLike | None = None, descriptors: ArrayLike | None = None,
+               scale_before: float | None = None) -> PreparedScan:
     """Segment the ground and describe the rest of one scan, once for all its registrations.
 
     Parameters
@@ -49,6 +53,8 @@ def preprocess(scan: SemanticScan, config: SgorConfig | None = None, *,
         Keypoints of the caller, metres, in place of the voxels.
     descriptors : (V, D) array, optional
         Their learned features, such as FCGF; both scans need the same D.
+    scale_before : float, optional
+        The scale of the scan before, to keep where it fits nearly as well.
 
     Returns
     -------
@@ -61,16 +67,37 @@ def preprocess(scan: SemanticScan, config: SgorConfig | None = None, *,
     """
     config = config or SgorConfig()
     with cores(config.threads):
-        return _prepare(scan, config, keypoints, descriptors)
+        given = None if keypoints is None and descriptors is None else (keypoints, descriptors)
+        return _prepare(scan, config, given, scale_before)
 
 
-def _prepare(scan: SemanticScan, config: SgorConfig, keypoints: ArrayLike | None,
-             descriptors: ArrayLike | None) -> PreparedScan:
-    convention = label_convention(config.label_convention)
+def at_scale(prepared: PreparedScan, scale: float) -> PreparedScan:
+    """Prepare a scan again where its scale is another."""
+    if prepared.scale == scale:
+        return prepared
+    again = _prepare(prepared.scan, prepared.config.replace(scale=scale), prepared.given, None)
+    return replace(again, config=prepared.config)
+
+
+def _prepare(scan: SemanticScan, asked: SgorConfig, given: Given | None,
+             scale_before: float | None) -> PreparedScan:
+    convention = label_convention(asked.label_convention)
     clock = Stopwatch()
     with clock('voxel grid'):
+        scale, config = asked.scale or 1.0, asked.scaled(asked.scale or 1.0)
         points, labels, warnings = _usable(scan, convention, config)
         cloud = voxel_grid(points, labels, config.voxel_size)
+        if asked.scale == 0:
+            even = cloud if config.voxel_size == STREET_VOXEL else voxel_grid(
+                points, labels, STREET_VOXEL)
+            scale = scale_of(even.points, scale_before)
+            if scale != 1:
+                config = asked.scaled(scale)
+                points, labels, warnings = _usable(scan, convention, config)
+                cloud = voxel_grid(points, labels, config.voxel_size)
+        if len(cloud.points) > config.max_voxels:
+            warnings.append(f'{len(cloud.points)} voxels thinned to {config.max_voxels}')
+            cloud = cloud[thin(len(cloud.points), config.max_voxels)]
     with clock('surface'):
         fixed = config.moving_vote | ~np.isin(cloud.labels, list(convention.movable))
         local = surface(cloud.points[fixed], config.threads) if config.local_refinement else None
@@ -83,10 +110,12 @@ def _prepare(scan: SemanticScan, config: SgorConfig, keypoints: ArrayLike | None
         regional = regional_labels(cloud, neighbours, config.vote_radius)
         keep = ~np.isin(regional, _unmatched_classes(convention, config))
         cloud, regional = cloud[keep], regional[keep]
-    if keypoints is None and descriptors is None:
-        features = _describe(cloud, regional, config, clock)
+    if given is None:
+        features, directions = _describe(cloud, regional, config, clock)
     else:
-        features = _given(keypoints, descriptors, cloud, regional, config)
+        features = _given(*given, cloud, regional, config)
+        directions = normals(features.points, radius_neighbours(
+            features.points, config.normal_radius), config.normal_radius)
     if ground is None:
         warnings.append('no ground plane found: no ground check')
     else:
@@ -95,9 +124,10 @@ def _prepare(scan: SemanticScan, config: SgorConfig, keypoints: ArrayLike | None
         if ground.source == 'geometry':
             warnings.append('no ground labels: ground plane found by geometry')
     with clock('view'):
-        sight = view(points, features, 2 * config.evidence_reach)
-    return PreparedScan(scan, config, features, ground, sight, local, tuple(warnings),
-                        clock.seconds)
+        sight = view(points, features, directions, None if ground is None else ground.normal,
+                     config.evidence_reach)
+    return PreparedScan(scan, asked, scale, features, ground, sight, local, tuple(warnings),
+                        clock.seconds, given)
 
 
 def _usable(scan: SemanticScan, convention: LabelConvention, config: SgorConfig
@@ -113,7 +143,12 @@ def _usable(scan: SemanticScan, convention: LabelConvention, config: SgorConfig
     warnings = []
     if unknown:
         warnings.append(_unknown_in_words(scan.labels & convention.mask, unknown, convention.name))
-    return np.compress(keep, scan.points, axis=0), labels[keep], warnings
+    labels = labels[keep]
+    if labels.any() and (labels == labels[0]).all():
+        warnings.append(f'every point is {convention.names.get(int(labels[0]), labels[0])}: '
+                        'treated as unlabelled')
+        labels[:] = UNLABELLED
+    return np.compress(keep, scan.points, axis=0), labels, warnings
 
 
 def _unknown_in_words(ids: NDArray[np.int64], unknown: list[int], convention: str) -> str:
@@ -136,14 +171,15 @@ def _unmatched_classes(convention: LabelConvention, config: SgorConfig) -> list[
 
 
 def _describe(cloud: VoxelCloud, regional: NDArray[np.uint8], config: SgorConfig,
-              clock: Stopwatch) -> Features:
+              clock: Stopwatch) -> tuple[Features, NDArray[np.float64]]:
+    """Return the voxels as keypoints, and their normals."""
     with clock('neighbours'):
         neighbours = radius_neighbours(cloud.points, config.descriptor_radius)
     with clock('normals'):
         directions = normals(cloud.points, neighbours, config.normal_radius)
     with clock('descriptors'):
         described = fpfh(cloud.points, directions, neighbours)
-    return Features(cloud.points, cloud.labels, regional, described)
+    return Features(cloud.points, cloud.labels, regional, described), directions
 
 
 def _over_ground(features: Features, ground: Ground, convention: LabelConvention,

@@ -11,9 +11,12 @@ from ..common.checks import as_points
 from ..common.checks import finite_rows
 from ..common.settings import InputError
 from ..config import SgorConfig
-from ..trust.evidence import View
+from ..trust.view import View
 from .features import Features
 from .ground import Ground
+
+Given = tuple[ArrayLike | None, ArrayLike | None]
+"""Keypoints and descriptors of the caller, before they are checked."""
 
 
 @dataclass(frozen=True, eq=False, init=False)
@@ -61,7 +64,9 @@ class PreparedScan:
     scan : SemanticScan
         What it was made from.
     config : SgorConfig
-        What it was made with.
+        What it was made with, but for the scale.
+    scale : float
+        What the lengths of the configuration were multiplied by.
     features : Features
         Keypoints with labels, descriptors and heights.
     ground : Ground or None
@@ -74,13 +79,17 @@ class PreparedScan:
         What was odd about the scan, in words.
     timings : dict of str to float
         Stage to seconds.
+    given : pair of arrays or None
+        Keypoints and descriptors of the caller.
     """
 
     scan: SemanticScan
     config: SgorConfig
+    scale: float
     features: Features
     ground: Ground | None
     view: View
     surface: Surface | None
     warnings: tuple[str, ...]
     timings: dict[str, float]
+    given: Given | None = None

@@ -63,6 +63,13 @@ def one_point_voxels(points: NDArray[np.float64], labels: NDArray[np.uint8]) -> 
     return VoxelCloud(points, votes, classes, labels)
 
 
+def thin(count: int, most: int) -> NDArray[np.intp]:
+    """Return at most `most` of the indices 0 to count - 1, evenly spread."""
+    if count <= most:
+        return np.arange(count)
+    return np.linspace(0, count - 1, most).astype(np.intp)
+
+
 def winning_labels(votes: NDArray[np.int32], classes: NDArray[np.uint8]) -> NDArray[np.uint8]:
     """Return the class with most votes in each row, (V,); ties go to the lower class."""
     if classes.size == 0:
@@ -86,7 +93,7 @@ def _accumulate(points, columns, voxel_size, n_classes):  # type: ignore[no-unty
     """Hash each point to its voxel; sum coordinates and votes."""
     n = len(points)
     n_slots = 1
-    while n_slots < n:
+    while n_slots < 2 * n:    # half full at the most: a full table is searched all over
         n_slots *= 2
     slots = np.full(n_slots, -1, np.int32)
     keys = np.empty(n, np.int64)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..matching.correspondences import Correspondences
+from ..scan.labels import labels_agree
 from .graph import ConsistencyGraph
 from .grouping import Groups
 from .grouping import squared_distance
@@ -40,10 +41,10 @@ def label_agreement(correspondences: Correspondences,
     c = correspondences
     if semantics == 'none':
         return np.ones(len(c), np.bool_), np.ones(len(c), np.bool_)
-    tight = c.source_labels == c.target_labels
+    tight = labels_agree(c.source_labels, c.target_labels)
     if semantics == 'hard':
         return tight, np.zeros(len(c), np.bool_)
-    return tight, c.source_regional == c.target_regional
+    return tight, labels_agree(c.source_regional, c.target_regional)
 
 
 def filter_groups(correspondences: Correspondences, graph: ConsistencyGraph, groups: Groups,

@@ -14,12 +14,15 @@ from numpy.typing import NDArray
 
 from ..config import SgorConfig
 from ..matching.correspondences import Correspondences
+from ..scan.voxels import thin
 
 PREFILTER_SLACK = 1e-3
 """Metres: float32 finds the candidate pairs, float64 decides. In a scan of 100 m the former errs
 by some 1e-5."""
 WEIGHT_STEPS = 8192
 """Steps of the table of W_m; between them it is linear, which is off by 1e-7 or so at the most."""
+MOST_EDGES = 2**25
+"""A quarter of a gigabyte; with more, and most matches right, some of them do."""
 
 U64 = np.uint64
 _ONE = U64(1)
@@ -52,7 +55,11 @@ class ConsistencyGraph:
 
 
 def consistency_graph(correspondences: Correspondences, config: SgorConfig) -> ConsistencyGraph:
-    """Compare all pairs of correspondences by length (Eq. 5, 6 and 8)."""
+    """Compare all pairs of correspondences by length (Eq. 5, 6 and 8).
+
+    Where more than `MOST_EDGES` are near, only some of the correspondences, evenly spread, have
+    edges.
+    """
     p, q = correspondences.source, correspondences.target
     n = len(p)
     reach = config.sigma_d * config.weight_cutoff
@@ -62,7 +69,14 @@ def consistency_graph(correspondences: Correspondences, config: SgorConfig) -> C
     _mark_pairs(columns, np.float32((reach + PREFILTER_SLACK)**2), bits)
     _mirror(bits)
     start = np.zeros(n + 1, np.uint64)
-    start[1:] = np.cumsum(_count_bits(bits))
+    nodes = n
+    while True:
+        np.cumsum(_count_bits(bits), out=start[1:])
+        if start[-1] <= MOST_EDGES:
+            break
+        # pairs go with the square of the nodes
+        nodes = min(int(nodes * math.sqrt(MOST_EDGES / int(start[-1]))), nodes - 1)
+        _leave(bits, thin(n, nodes))
     inner = np.empty(n, np.uint64)
     # one piece of memory: of two, the system takes back what the next call asks for again
     edges = np.empty((2, start[-1]), np.uint32)
@@ -71,6 +85,15 @@ def consistency_graph(correspondences: Correspondences, config: SgorConfig) -> C
     _weigh_pairs(np.hstack((p, q)), bits, config.sigma_d, reach, table, start, inner, index,
                  weight)
     return ConsistencyGraph(start, inner, index, weight)
+
+
+def _leave(bits: NDArray[np.uint64], rows: NDArray[np.intp]) -> None:
+    """Clear all bits but those of the given rows and columns."""
+    n, words = bits.shape
+    kept = np.zeros(64 * words, np.bool_)
+    kept[rows] = True
+    bits[~kept[:n]] = 0
+    bits &= np.packbits(kept, bitorder='little').view('<u8')
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True)

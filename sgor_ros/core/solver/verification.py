@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from ..config import SgorConfig
 from ..matching.correspondences import Correspondences
 from ..trust.evidence import rank
-from ..trust.evidence import View
+from ..trust.view import View
 from .hypotheses import Hypotheses
 
 Normals = tuple[NDArray[np.float64], NDArray[np.float64]]
@@ -24,12 +24,15 @@ class Verdict:
     passed_ground_check : (H,) bool
     cost : (H,) float64
         Mean truncated distance over G', metres; infinite where the ground check failed.
+    score : (H,) float64
+        What chose: minus the cost, or the evidence of the clouds.
     best : int
         Index of the winner, -1 if none passed.
     """
 
     passed_ground_check: NDArray[np.bool_]
     cost: NDArray[np.float64]
+    score: NDArray[np.float64]
     best: int
 
     @property
@@ -53,14 +56,14 @@ def verify(hypotheses: Hypotheses, correspondences: Correspondences,
         passed = ground_angles(T, *ground_normals) < config.sigma_theta
     cost = np.full(len(T), np.inf)
     if not passed.any():
-        return Verdict(passed, cost, -1)
+        return Verdict(passed, cost, -cost, -1)
     union = np.unique(hypotheses.kept[hypotheses.kept >= 0])
     cost[passed] = truncated_distance(
         T[passed], correspondences.source[union], correspondences.target[union], config.sigma_d)
+    score = -cost
     if config.cloud_check and views is not None:
-        rows = np.flatnonzero(passed)
-        return Verdict(passed, cost, int(rows[np.argmax(rank(*views, T[rows]))]))
-    return Verdict(passed, cost, int(np.argmin(cost)))
+        score[passed] = rank(*views, T[passed])
+    return Verdict(passed, cost, score, int(np.argmax(score)))
 
 
 def ground_angles(T: NDArray[np.float64], source_normal: NDArray[np.float64],

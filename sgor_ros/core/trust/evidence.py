@@ -1,8 +1,9 @@
 """Evidence of the clouds for or against a transformation (beyond the paper).
 
-Under the right transformation the keypoints of one scan find keypoints of the other with the same
-regional label beside them, and none hangs in the air that the other sensor has looked through.
-Both are asked of both scans.
+Under the right transformation the keypoints of one scan lie on surfaces of the other with the same
+regional label (*agree*), and none hangs in the air that the other sensor has looked through (a
+free-space violation: *contradict*). What the other sensor could not see says nothing. Both are
+asked of both scans.
 """
 from dataclasses import dataclass
 import math
@@ -12,44 +13,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common import se3
-from ..common.angles import atan2
-from ..scan.features import Features
+from ..scan.labels import UNLABELLED
+from .view import direction
+from .view import slot_of
+from .view import View
 
-AZIMUTHS, ELEVATIONS = 360, 180
-"""Cells of the range image: 1 degree, wider than the gaps between beams."""
-MARGIN_SHARE = 0.02
-"""A point contradicts when it is nearer than all that was seen there by this share of the range
-and one cell of the view: edges and grazing rays must not speak against what is right."""
+AGREE, SILENT, CONTRADICT = 1, 0, -1
+
+TANGENTIAL = 0.1
+"""Share of a squared distance along the surface that counts: there, points lie where the beams
+happened to hit."""
+ON_SURFACE = 0.35
+"""A point agrees within this share of the reach of a surface."""
+MARGIN, MARGIN_SHARE = 0.5, 0.02
+"""A point contradicts when it is nearer than all that was measured around its direction, by this
+share of the reach and this share of the range."""
+SEVERITY = 5.0
+"""A contradiction weighs so many agreements: the right transformation has hardly any."""
 DOUBT = 0.01
 """Share of keypoints that speaks against every transformation: a handful alone proves nothing."""
 SAMPLE = 400
 """Keypoints asked for each hypothesis."""
-
-
-@dataclass(frozen=True, eq=False)
-class View:
-    """What one scan can say about points of another.
-
-    Attributes
-    ----------
-    points : (V, 3) float64
-        Keypoints, metres.
-    labels : (V,) uint8
-        Their regional labels.
-    cell : float
-        Cell size of the point hash, metres; the farthest partner that can be found.
-    slots, chain : (S,) int32, (V,) int32
-        Hash of the cells: first point of a slot, next point with the same slot.
-    nearest : (360, 180) float32
-        Shortest range measured in each direction, metres; infinite where nothing was.
-    """
-
-    points: NDArray[np.float64]
-    labels: NDArray[np.uint8]
-    cell: float
-    slots: NDArray[np.int32]
-    chain: NDArray[np.int32]
-    nearest: NDArray[np.float32]
 
 
 @dataclass(frozen=True)
@@ -59,7 +43,7 @@ class Evidence:
     Attributes
     ----------
     agree : float
-        Have a partner of the same label.
+        Lie on a surface of the same label.
     contradict : float
         Hang where the other sensor has looked through.
     """
@@ -69,98 +53,73 @@ class Evidence:
 
     @property
     def confidence(self) -> float:
-        """The part of those who speak that speak for it, 0 to 1."""
-        return self.agree / (self.agree + self.contradict + DOUBT)
+        """The weight of those that speak for it among those that speak, 0 to 1."""
+        return self.agree / (self.agree + SEVERITY * self.contradict + DOUBT)
 
 
-def view(points: NDArray[np.float32], features: Features, cell: float) -> View:
-    """Prepare the evidence of one scan from its (N, 3) points and its keypoints."""
-    slots, chain = _hash_points(features.points, cell)
-    return View(features.points, features.regional, cell, slots, chain, _range_image(points))
+def evidence_of(outcomes: NDArray[np.int8]) -> Evidence:
+    """Sum up the outcomes (n,) of all points that were asked."""
+    asked = max(len(outcomes), 1)
+    return Evidence(int((outcomes == AGREE).sum()) / asked,
+                    int((outcomes == CONTRADICT).sum()) / asked)
 
 
-def evidence(source: View, target: View, T_target_source: NDArray[np.float64],
-             reach: float) -> Evidence:
-    """Ask both scans about one transformation.
+def evidence(source: View, target: View, T_target_source: NDArray[np.float64]) -> Evidence:
+    """Ask all keypoints of both scans about one (4, 4) transformation."""
+    most = max(len(source.points), len(target.points))
+    return evidence_of(testify(source, target, T_target_source[None], most)[0])
+
+
+def testify(source: View, target: View, T_target_source: NDArray[np.float64],
+            sample: int) -> NDArray[np.int8]:
+    """Ask both scans about transformations.
 
     Parameters
     ----------
-    reach : float
-        Farthest partner, metres; at most the cell size of the views.
+    T_target_source : (H, 4, 4) float64
+    sample : int
+        Keypoints to ask of each scan, evenly spread.
+
+    Returns
+    -------
+    (H, n) int8
+        `AGREE`, `SILENT` or `CONTRADICT`: those of the source, then those of the target.
     """
-    forth = _testify(source, target, T_target_source[None], reach, None)[0]
-    back = _testify(target, source, se3.inverse(T_target_source)[None], reach, None)[0]
-    asked = max(len(source.points) + len(target.points), 1)
-    agree, contradict = (forth * len(source.points) + back * len(target.points)) / asked
-    return Evidence(float(agree), float(contradict))
+    inverse = np.array([se3.inverse(T) for T in T_target_source]).reshape(-1, 4, 4)
+    return np.hstack((_ask(source, target, T_target_source, sample),
+                      _ask(target, source, inverse, sample)))
 
 
 def rank(source: View, target: View, T_target_source: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return agree minus contradict for each of (H, 4, 4), from a sample of the source."""
-    shares = _testify(source, target, T_target_source, target.cell, SAMPLE)
-    return shares[:, 0] - shares[:, 1]
+    """Return agree minus contradict for each of rough (H, 4, 4), from a sample of the source."""
+    outcomes = _ask(source, target, T_target_source, SAMPLE, rough=True)
+    mean: NDArray[np.float64] = outcomes.mean(axis=1)
+    return mean
 
 
-def _testify(source: View, target: View, T: NDArray[np.float64], reach: float,
-             sample: int | None) -> NDArray[np.float64]:
-    rows = np.arange(len(source.points))
-    if sample is not None and len(rows) > sample:
-        rows = np.linspace(0, len(rows) - 1, sample).astype(np.intp)
-    if not len(rows):
-        return np.zeros((len(T), 2))
-    shares: NDArray[np.float64] = _shares(
-        source.points[rows], source.labels[rows], T, target.points, target.labels, target.cell,
-        target.slots, target.chain, target.nearest, reach)
-    return shares
+def _ask(source: View, target: View, T: NDArray[np.float64], sample: int, *, rough: bool = False
+         ) -> NDArray[np.int8]:
+    rows = spread(len(source.points), sample)
+    outcomes = np.zeros((len(T), len(rows)), np.int8)
+    # roughly, whatever is in the cells around is a partner
+    reach, near, margin = ((target.cell, target.cell, target.cell) if rough else
+                           (target.reach, ON_SURFACE * target.reach, MARGIN * target.reach))
+    _outcomes(source.points[rows], source.labels[rows], T, target.points, target.normals,
+              target.labels, target.cell, target.slots, target.chain, target.nearest, reach,
+              near * near, margin, outcomes)
+    return outcomes
 
 
-@numba.njit(cache=True, nogil=True, inline='always')
-def _slot(x, y, z, mask):  # type: ignore[no-untyped-def]
-    key = x * np.int64(73856093) ^ y * np.int64(19349663) ^ z * np.int64(83492791)
-    return (key ^ (key >> 15)) & mask
-
-
-@numba.njit(cache=True, nogil=True)
-def _hash_points(points, cell):  # type: ignore[no-untyped-def]
-    size = 1024
-    while size < 2 * len(points):
-        size *= 2
-    slots = np.full(size, -1, np.int32)
-    chain = np.full(len(points), -1, np.int32)
-    for i in range(len(points)):
-        slot = _slot(np.int64(np.floor(points[i, 0] / cell)),
-                     np.int64(np.floor(points[i, 1] / cell)),
-                     np.int64(np.floor(points[i, 2] / cell)), size - 1)
-        chain[i] = slots[slot]
-        slots[slot] = i
-    return slots, chain
-
-
-@numba.njit(cache=True, nogil=True, inline='always')
-def _direction(x, y, z):  # type: ignore[no-untyped-def]
-    azimuth = int((atan2(y, x) / (2 * math.pi) + 0.5) * AZIMUTHS)
-    elevation = int((atan2(z, math.sqrt(x * x + y * y)) / math.pi + 0.5) * ELEVATIONS)
-    return min(max(azimuth, 0), AZIMUTHS - 1), min(max(elevation, 0), ELEVATIONS - 1)
-
-
-@numba.njit(cache=True, nogil=True)
-def _range_image(points):  # type: ignore[no-untyped-def]
-    nearest = np.full((AZIMUTHS, ELEVATIONS), np.inf, np.float32)
-    for i in range(len(points)):
-        x, y, z = points[i]
-        r = math.sqrt(x * x + y * y + z * z)
-        if r > 0:
-            a, e = _direction(x, y, z)
-            nearest[a, e] = min(nearest[a, e], r)
-    return nearest
+def spread(count: int, most: int) -> NDArray[np.intp]:
+    """Return at most `most` of the indices 0 to count - 1, evenly spread."""
+    if count <= most:
+        return np.arange(count)
+    return np.linspace(0, count - 1, most).astype(np.intp)
 
 
 @numba.njit(cache=True, nogil=True, parallel=True)
-def _shares(points, labels, T, others, other_labels, cell, slots,  # type: ignore[no-untyped-def]
-            chain, nearest, reach):
-    """Return the shares that agree and that contradict, (H, 2)."""
-    shares = np.zeros((len(T), 2))
-    outcome = np.zeros((len(T), len(points)), np.int8)
+def _outcomes(points, labels, T, others, normals, other_labels, cell,  # type: ignore[no-untyped-def]
+              slots, chain, nearest, reach, limit, margin, outcomes):
     for task in numba.prange(len(T) * len(points)):
         h = np.int64(task) // len(points)
         i = np.int64(task) % len(points)
@@ -170,46 +129,56 @@ def _shares(points, labels, T, others, other_labels, cell, slots,  # type: ignor
             + T[h, 1, 3]
         z = T[h, 2, 0] * points[i, 0] + T[h, 2, 1] * points[i, 1] + T[h, 2, 2] * points[i, 2] \
             + T[h, 2, 3]
-        near, same = _partner(x, y, z, labels[i], others, other_labels, cell, slots, chain, reach)
-        if same:
-            outcome[h, i] = 1
-        elif not near:
-            r = math.sqrt(x * x + y * y + z * z)
-            if r > 0:
-                a, e = _direction(np.float32(x), np.float32(y), np.float32(z))
-                # nothing measured there is no evidence
-                if nearest[a, e] < np.inf and r < nearest[a, e] * (1 - MARGIN_SHARE) - cell:
-                    outcome[h, i] = 2
-    for row in range(len(T)):
-        for column in range(len(points)):
-            if outcome[row, column] > 0:
-                shares[row, outcome[row, column] - 1] += 1.0 / len(points)
-    return shares
+        if _on_surface(x, y, z, labels[i], others, normals, other_labels, cell, slots, chain,
+                       reach, limit):
+            outcomes[h, i] = AGREE
+            continue
+        r = math.sqrt(x * x + y * y + z * z)
+        if r > 0:
+            a, e = direction(np.float32(x), np.float32(y), np.float32(z))
+            # nothing measured there is no evidence
+            if nearest[a, e] < np.inf and r < nearest[a, e] * (1 - MARGIN_SHARE) - margin:
+                outcomes[h, i] = CONTRADICT
 
 
 @numba.njit(cache=True, nogil=True)
-def _partner(x, y, z, label, others, other_labels, cell, slots,  # type: ignore[no-untyped-def]
-             chain, reach):
-    """Return whether any point is within reach, and whether one of the same label is."""
-    near = False
-    limit = reach * reach
-    # the 8 cells around that a ball of up to half a cell can touch, 27 for a larger one
-    low, high = (0, 1) if 2 * reach <= cell else (-1, 1)
-    cx, cy, cz = x / cell, y / cell, z / cell
-    if low == 0:
-        cx, cy, cz = cx - 0.5, cy - 0.5, cz - 0.5
-    ix, iy, iz = np.int64(np.floor(cx)), np.int64(np.floor(cy)), np.int64(np.floor(cz))
-    for dx in range(low, high + 1):
-        for dy in range(low, high + 1):
-            for dz in range(low, high + 1):
-                k = slots[_slot(ix + dx, iy + dy, iz + dz, len(slots) - 1)]
+def _on_surface(x, y, z, label, others, normals, other_labels, cell,  # type: ignore[no-untyped-def]
+                slots, chain, reach, limit):
+    """Return whether a surface of the same label is near, by `gap` below `limit`."""
+    low, high, shift = cells_around(reach, cell)
+    ix, iy, iz = (np.int64(np.floor(x / cell - shift)), np.int64(np.floor(y / cell - shift)),
+                  np.int64(np.floor(z / cell - shift)))
+    for dx in range(low, high):
+        for dy in range(low, high):
+            for dz in range(low, high):
+                k = slots[slot_of(ix + dx, iy + dy, iz + dz, len(slots) - 1)]
                 while k >= 0:
-                    a = others[k, 0] - x
-                    b = others[k, 1] - y
-                    c = others[k, 2] - z
-                    if a * a + b * b + c * c <= limit:
-                        near = True
-                        if other_labels[k] == label:
-                            return True, True
+                    if alike(label, other_labels[k]):
+                        a, b, c = x - others[k, 0], y - others[k, 1], z - others[k, 2]
+                        squared = a * a + b * b + c * c
+                        if squared <= reach * reach and gap(a, b, c, squared, normals[k]) <= limit:
+                            return True
                     k = chain[k]
-    return near, False
+    return False
+
+
+@numba.njit(cache=True, nogil=True, inline='always')
+def alike(one, other):  # type: ignore[no-untyped-def]
+    """Return whether two regional labels may be of one thing; the unlabelled may be anything."""
+    return one == other or min(one, other) == UNLABELLED
+
+
+@numba.njit(cache=True, nogil=True, inline='always')
+def gap(a, b, c, squared, normal):  # type: ignore[no-untyped-def]
+    """Return the squared distance to a surface: full across it, a share of it along it."""
+    across = a * normal[0] + b * normal[1] + c * normal[2]
+    return across * across * (1 - TANGENTIAL) + TANGENTIAL * squared
+
+
+@numba.njit(cache=True, nogil=True, inline='always')
+def cells_around(reach, cell):  # type: ignore[no-untyped-def]
+    """Return the range of cells a ball can touch, and the shift that makes them so few.
+
+    Eight for a ball of up to half a cell, 27 for a larger one.
+    """
+    return (0, 2, 0.5) if 2 * reach <= cell * (1 + 1e-9) else (-1, 2, 0.0)

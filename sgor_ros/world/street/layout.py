@@ -10,6 +10,9 @@ import numpy.typing as npt
 from scipy.ndimage import gaussian_filter1d
 from scipy.spatial import cKDTree
 
+from ..waves import draw_waves
+from ..waves import wave_sum
+
 Array = npt.NDArray[np.float64]
 
 KERB_HEIGHT = 0.12  # m
@@ -132,7 +135,7 @@ class Layout:
 
     def road_height(self, xy: Array) -> Array:
         """Height of the land at road level, (N,), m, at points (N, 2)."""
-        return np.asarray(xy @ self.slope + _wave_sum(self.road_waves, xy))
+        return np.asarray(xy @ self.slope + wave_sum(self.road_waves, xy))
 
     def ground_height(self, xy: Array, kerb: Array | None = None) -> Array:
         """Height of road, sidewalk or terrain.
@@ -152,7 +155,7 @@ class Layout:
         kerb = self.kerb_distance(xy) if kerb is None else kerb
         step = KERB_HEIGHT * np.clip(kerb / _STEP, 0.0, 1.0)
         wild = np.clip((kerb - self.sidewalk) / 3.0, 0.0, 1.0)
-        return np.asarray(self.road_height(xy) + step + wild * _wave_sum(self.terrain_waves, xy))
+        return np.asarray(self.road_height(xy) + step + wild * wave_sum(self.terrain_waves, xy))
 
 
 def make_layout(rng: np.random.Generator) -> Layout:
@@ -164,9 +167,9 @@ def make_layout(rng: np.random.Generator) -> Layout:
     return Layout(
         streets=(loop, *sides),
         sidewalk=rng.uniform(1.8, 2.6),
-        road_waves=np.vstack([_waves(rng, 4, (60.0, 160.0), 0.5),
-                              _waves(rng, 8, (5.0, 18.0), 0.008)]),
-        terrain_waves=_waves(rng, 8, (3.0, 14.0), 0.05),
+        road_waves=np.vstack([draw_waves(rng, 4, (60.0, 160.0), 0.5),
+                              draw_waves(rng, 8, (5.0, 18.0), 0.008)]),
+        terrain_waves=draw_waves(rng, 8, (3.0, 14.0), 0.05),
         slope=rng.uniform(-0.025, 0.025, 2),
     )
 
@@ -204,22 +207,3 @@ def resample_closed(points: Array, step: float) -> Array:
     along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(ring, axis=0), axis=1))])
     wanted = np.linspace(0.0, along[-1], round(along[-1] / step), endpoint=False)
     return np.column_stack([np.interp(wanted, along, ring[:, k]) for k in range(2)])
-
-
-def _waves(rng: np.random.Generator, count: int, length: tuple[float, float],
-           amplitude: float) -> Array:
-    direction = rng.uniform(0.0, 2 * np.pi, count)
-    number = 2 * np.pi / rng.uniform(*length, count)
-    return np.column_stack([
-        number * np.cos(direction),
-        number * np.sin(direction),
-        rng.uniform(0.0, 2 * np.pi, count),
-        amplitude * rng.uniform(0.4, 1.0, count),
-    ])
-
-
-def _wave_sum(waves: Array, xy: Array) -> Array:
-    total = np.zeros(len(xy))
-    for kx, ky, phase, amplitude in waves:
-        total += amplitude * np.sin(kx * xy[:, 0] + ky * xy[:, 1] + phase)
-    return total

@@ -7,7 +7,7 @@ import numpy.typing as npt
 from scipy.interpolate import CubicSpline
 
 from .layout import resample_closed
-from .scene import Scene
+from .scene import StreetScene
 
 Array = npt.NDArray[np.float64]
 
@@ -18,13 +18,13 @@ _WANDER_LENGTH = 83.0  # m
 _WHEELS = np.array([(1.35, 0.75), (1.35, -0.75), (-1.35, 0.75), (-1.35, -0.75)])  # m
 
 
-def loop_trajectory(scene: Scene, n_scans: int, speed: float = 6.0,
+def loop_trajectory(scene: StreetScene, n_scans: int, speed: float = 6.0,
                     period: float = 0.1) -> Array:
     """Drive around the loop in the right-hand lane, again and again if need be.
 
     Parameters
     ----------
-    scene : Scene
+    scene : StreetScene
         Where to drive.
     n_scans : int
         Number of poses.

@@ -7,14 +7,14 @@ from collections import defaultdict
 import numpy as np
 import numpy.typing as npt
 
-from .labels import FENCE
-from .labels import ROAD
-from .labels import SIDEWALK
-from .labels import TERRAIN
+from ..labels import FENCE
+from ..labels import ROAD
+from ..labels import SIDEWALK
+from ..labels import TERRAIN
+from ..objects import Parts
+from ..shapes import from_quads
+from ..shapes import place
 from .layout import Layout
-from .objects import Parts
-from .shapes import from_quads
-from .shapes import place
 
 Array = npt.NDArray[np.float64]
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from . import objects
-from .building import house
-from .labels import BUILDING
+from .. import objects
+from ..building import house
+from ..labels import BUILDING
+from ..shapes import place
 from .layout import Street
-from .shapes import place
 from .site import Site
 
 Array = npt.NDArray[np.float64]

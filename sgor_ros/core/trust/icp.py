@@ -1,0 +1,146 @@
+"""Point-to-plane ICP of many placements at once, on keypoints and their regional labels.
+
+Rough, quick and alike for all: so that rivals are compared where each fits best.
+"""
+import math
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from ..common import se3
+from .evidence import alike
+from .evidence import cells_around
+from .evidence import gap
+from .evidence import ON_SURFACE
+from .evidence import spread
+from .evidence import TANGENTIAL
+from .view import slot_of
+from .view import View
+
+SAMPLE = 300
+"""Keypoints of the source that are fitted."""
+FEWEST_PARTNERS = 10
+"""With fewer partners a placement stays where it is."""
+SOFTNESS = 0.4
+"""Distances beyond this share of the reach pull less (Geman-McClure)."""
+
+
+def icp(source: View, target: View, T_target_source: NDArray[np.float64], wide: int, narrow: int
+        ) -> NDArray[np.float64]:
+    """Fit each of (H, 4, 4) placements.
+
+    Parameters
+    ----------
+    wide, narrow : int
+        Rounds with partners up to twice the reach of the views, and up to the reach.
+
+    Returns
+    -------
+    (H, 4, 4) float64
+    """
+    rows = spread(len(source.points), SAMPLE)
+    T = np.array(T_target_source)
+    _icp(source.points[rows], source.labels[rows], T, target.points, target.normals,
+         target.labels, target.cell, target.slots, target.chain, target.reach, wide, narrow)
+    return T
+
+
+def partners(source: View, target: View, T_target_source: NDArray[np.float64], sample: int
+             ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return rows of source keypoints and of the target keypoints that they lie on, (P,) each."""
+    rows = spread(len(source.points), sample)
+    found = np.empty(len(rows), np.int64)
+    _partners(se3.transform(T_target_source, source.points[rows]), source.labels[rows],
+              target.points, target.normals, target.labels, target.cell, target.slots,
+              target.chain, target.reach, (ON_SURFACE * target.reach)**2, found)
+    return rows[found >= 0], found[found >= 0]
+
+
+@numba.njit(cache=True, nogil=True)
+def _partners(placed, labels, others, normals, other_labels, cell,  # type: ignore[no-untyped-def]
+              slots, chain, reach, limit, found):
+    for i in range(len(placed)):
+        x, y, z = placed[i]
+        at, best = _nearest(x, y, z, labels[i], others, normals, other_labels, cell, slots, chain,
+                            reach)
+        found[i] = at if best <= limit else -1
+
+
+@numba.njit(cache=True, nogil=True)
+def _nearest(x, y, z, label, others, normals, other_labels, cell,  # type: ignore[no-untyped-def]
+             slots, chain, reach):
+    """Return the partner with the smallest gap, -1 without any, and that gap, m^2."""
+    best, at = np.inf, -1
+    low, high, shift = cells_around(reach, cell)
+    ix, iy, iz = (np.int64(np.floor(x / cell - shift)), np.int64(np.floor(y / cell - shift)),
+                  np.int64(np.floor(z / cell - shift)))
+    for dx in range(low, high):
+        for dy in range(low, high):
+            for dz in range(low, high):
+                k = slots[slot_of(ix + dx, iy + dy, iz + dz, len(slots) - 1)]
+                while k >= 0:
+                    if alike(label, other_labels[k]):
+                        a, b, c = x - others[k, 0], y - others[k, 1], z - others[k, 2]
+                        squared = a * a + b * b + c * c
+                        if squared <= reach * reach:
+                            found = gap(a, b, c, squared, normals[k])
+                            if found < best:
+                                best, at = found, k
+                    k = chain[k]
+    return at, best
+
+
+@numba.njit(cache=True, nogil=True, parallel=True)
+def _icp(points, labels, T, others, normals, other_labels, cell,  # type: ignore[no-untyped-def]
+         slots, chain, reach, wide, narrow):
+    for h in numba.prange(len(T)):
+        rows = np.zeros((4, 6))    # normal, and the three axes: of translation and rotation
+        for turn in range(wide + narrow):
+            far = 2 * reach if turn < wide else reach
+            H, g = np.zeros((6, 6)), np.zeros(6)
+            partners = 0
+            for i in range(len(points)):
+                px, py, pz = points[i]
+                lx = T[h, 0, 0] * px + T[h, 0, 1] * py + T[h, 0, 2] * pz
+                ly = T[h, 1, 0] * px + T[h, 1, 1] * py + T[h, 1, 2] * pz
+                lz = T[h, 2, 0] * px + T[h, 2, 1] * py + T[h, 2, 2] * pz
+                x, y, z = lx + T[h, 0, 3], ly + T[h, 1, 3], lz + T[h, 2, 3]
+                at, found = _nearest(x, y, z, labels[i], others, normals, other_labels, cell,
+                                     slots, chain, far)
+                if at < 0:
+                    continue
+                partners += 1
+                nx, ny, nz = normals[at]
+                ex, ey, ez = x - others[at, 0], y - others[at, 1], z - others[at, 2]
+                pull = 1 / (1 + found / (SOFTNESS * far)**2)**2
+                rows[0] = (nx, ny, nz, ly * nz - lz * ny, lz * nx - lx * nz, lx * ny - ly * nx)
+                rows[1] = (1.0, 0.0, 0.0, 0.0, lz, -ly)
+                rows[2] = (0.0, 1.0, 0.0, -lz, 0.0, lx)
+                rows[3] = (0.0, 0.0, 1.0, ly, -lx, 0.0)
+                for r, error in enumerate((ex * nx + ey * ny + ez * nz, ex, ey, ez)):
+                    weight = pull * (1 - TANGENTIAL if r == 0 else TANGENTIAL)
+                    for a in range(6):
+                        g[a] += weight * rows[r, a] * error
+                        for b in range(a + 1):
+                            H[a, b] += weight * rows[r, a] * rows[r, b]
+            if partners < FEWEST_PARTNERS:
+                break
+            for a in range(6):
+                H[a, a] += 1e-6 * partners    # points on a line leave a turn about it free
+                for b in range(a):
+                    H[b, a] = H[a, b]
+            step = -np.linalg.solve(H, g)
+            _turn(T[h], step)
+
+
+@numba.njit(cache=True, nogil=True)
+def _turn(T, step):  # type: ignore[no-untyped-def]
+    """Move a placement by (translation, rotation about its own origin), in the target frame."""
+    angle = math.sqrt(step[3]**2 + step[4]**2 + step[5]**2)
+    if angle > 0:
+        x, y, z = step[3:] / angle
+        K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+        R = np.eye(3) + math.sin(angle) * K + (1 - math.cos(angle)) * (K @ K)
+        T[:3, :3] = R @ np.ascontiguousarray(T[:3, :3])
+    T[:3, 3] += step[:3]

@@ -1,0 +1,54 @@
+"""Picture of how far confidence can be believed."""
+from collections.abc import Sequence
+from pathlib import Path
+
+from matplotlib.figure import Figure
+import numpy as np
+
+from .plots import DPI
+from .run import Row
+from .trust import BINS
+from .trust import reliability
+
+
+def plot_reliability(path: Path, rows: Sequence[Row], methods: Sequence[str], default: float
+                     ) -> None:
+    """Draw the share that is right against the confidence, and how many there are of each.
+
+    Parameters
+    ----------
+    path : Path
+        Where to.
+    rows : sequence of Row
+    methods : sequence of str
+        Which of them, a column each.
+    default : float
+        The threshold below which answers are refused.
+    """
+    figure = Figure(figsize=(6.5 * len(methods), 7.5), layout='constrained')
+    grid = figure.subplots(2, len(methods), sharex=True, squeeze=False, height_ratios=(2, 1))
+    for (top, bottom), name in zip(grid.T, methods, strict=True):
+        own = [row for row in rows if row.method == name]
+        bins = reliability(own)
+        top.plot((0, 100), (0, 100), ':', color='gray', label='says what it is')
+        top.plot([100 * each.mean for each in bins],
+                 [100 * each.right / each.answers for each in bins], 'o-', color='#1f5fa8',
+                 label='answers, refused ones too')
+        top.set(ylabel='share that is right [%]', ylim=(-3, 103))
+        top.set_title(name, loc='left', weight='bold')
+        _histogram = {
+            'right': ([row for row in own if row.right and row.within], '#2a7f3f'),
+            'wrong answer': ([row for row in own if row.right and not row.within], '#e0a100'),
+            'different places': ([row for row in own if not row.right], '#c0392b')}
+        shown = {kind: ([100 * row.confidence for row in part if not np.isnan(row.confidence)],
+                        colour) for kind, (part, colour) in _histogram.items()}
+        bottom.hist([values for values, _ in shown.values()], 100 * np.array(BINS), stacked=True,
+                    color=[colour for _, colour in shown.values()],
+                    label=[f'{kind} ({len(values)})' for kind, (values, _) in shown.items()])
+        bottom.set(xlabel='confidence [%]', ylabel='answers', xlim=(0, 100))
+        for axes in (top, bottom):
+            axes.axvline(100 * default, color='black', ls='--', lw=1,
+                         label=f'min_confidence = {default:g}')
+            axes.grid(alpha=0.25)
+            axes.legend(fontsize=9)
+    figure.savefig(path, dpi=DPI)
