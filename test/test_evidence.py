@@ -9,9 +9,10 @@ from sgor_ros import SemanticScan
 from sgor_ros.core.scan.features import Features
 from sgor_ros.core.trust.evidence import evidence
 from sgor_ros.core.trust.evidence import rank
-from sgor_ros.core.trust.evidence import view
+from sgor_ros.core.trust.view import view
 
-REACH, CELL = 0.6, 1.2
+REACH = 0.6
+UP = np.array([0.0, 0.0, 1.0])
 WALL, POLE = 13, 18
 NOTHING_SEEN = np.array([[0, 0, 50]], np.float32)    # a single return, straight up
 
@@ -22,25 +23,32 @@ def keypoints(points, labels):
     return Features(points, labels, labels, np.zeros((len(points), 3), np.float32))
 
 
+def view_of(points, keys, facing=(-1.0, 0.0, 0.0)):
+    """Return the view of a sensor whose keypoints all face one way."""
+    return view(points, keys, np.tile(facing, (len(keys.points), 1)), UP, REACH)
+
+
 @pytest.fixture(scope='module')
 def wall():
     """Return the view of a sensor that sees one wall at 10 m, with two keypoints on it."""
     y, z = np.meshgrid(np.arange(-5, 5, 0.05), np.arange(-2, 3, 0.05))
     points = np.c_[np.full(y.size, 10.0), y.ravel(), z.ravel()].astype(np.float32)
-    return view(points, keypoints([[10, 0, 0], [10, 3, 0]], [WALL, WALL]), CELL)
+    return view_of(points, keypoints([[10, 0, 0], [10, 3, 0]], [WALL, WALL]))
 
 
 def asked(wall, points, labels, T=None):
     """Return what both say of keypoints of a source that itself has seen nothing."""
-    source = view(NOTHING_SEEN, keypoints(points, labels), CELL)
-    return evidence(source, wall, np.eye(4) if T is None else T, REACH)
+    source = view_of(NOTHING_SEEN, keypoints(points, labels))
+    return evidence(source, wall, np.eye(4) if T is None else T)
 
 
 @pytest.mark.parametrize(('point', 'agree', 'contradict'), [
-    ((10.3, 0.2, 0), 1, 0),     # a partner of the same label
+    ((10.15, 0.2, 0), 1, 0),    # on the wall, as far as the wall is known
+    ((10.3, 0.2, 0), 0, 0),     # near it, but not on it
     ((5, 0, 0), 0, 1),          # hangs where the wall was seen through it
     ((15, 0, 0), 0, 0),         # behind the wall: hidden
-    ((9.3, 0, 0), 0, 0),        # in front, but within the margin
+    ((9.6, 0, 0), 0, 0),        # in front, but within the margin
+    ((9.4, 0, 0), 0, 1),        # just outside the margin
     ((-5, 0, 0), 0, 0),         # nothing was measured there
     ((5, 1.5, 0), 0, 1),        # towards the second keypoint
 ])
@@ -54,7 +62,7 @@ def test_one_point_by_hand(wall, point, agree, contradict):
 
 def test_a_point_of_another_label_neither_agrees_nor_contradicts(wall):
     """Labels may be wrong: something is there, so the point does not hang in free space."""
-    found = asked(wall, [[10.3, 0, 0]], [POLE])
+    found = asked(wall, [[10.15, 0, 0]], [POLE])
     assert (found.agree, found.contradict) == (0, 0)
 
 
@@ -63,8 +71,8 @@ def test_what_has_no_label_speaks_by_its_place(label, wall_label):
     """It agrees with whatever is near, and hangs in the air as everything else does."""
     y, z = np.meshgrid(np.arange(-5, 5, 0.05), np.arange(-2, 3, 0.05))
     points = np.c_[np.full(y.size, 10.0), y.ravel(), z.ravel()].astype(np.float32)
-    wall = view(points, keypoints([[10, 0, 0], [10, 3, 0]], [wall_label] * 2), CELL)
-    found = asked(wall, [[10.3, 0.2, 0], [5, 0, 0]], [label] * 2)
+    wall = view_of(points, keypoints([[10, 0, 0], [10, 3, 0]], [wall_label] * 2))
+    found = asked(wall, [[10.15, 0.2, 0], [5, 0, 0]], [label] * 2)
     assert found.agree == pytest.approx((1 + 1) / 4)
     assert found.contradict == pytest.approx(1 / 4)
 
@@ -75,15 +83,15 @@ def test_shares_by_hand(wall):
     found = asked(wall, points, [WALL, WALL, WALL, WALL, WALL, POLE])
     assert found.agree == pytest.approx((2 + 2) / (6 + 2))
     assert found.contradict == pytest.approx((1 + 0) / (6 + 2))
-    assert found.confidence == pytest.approx(0.5 / (0.5 + 0.125 + 0.01))
+    assert found.confidence == pytest.approx(0.5 / (0.5 + 5 * 0.125 + 0.01))
 
 
 def test_a_handful_cannot_make_many_confident(wall):
     """Both points of the wall agree, two of 998 do, nobody contradicts: 4 of 1000."""
     hidden = np.random.default_rng(0).uniform([15, -1, -1], [20, 1, 1], (996, 3))
-    many = view(NOTHING_SEEN, keypoints([[10, 0, 0.3], [10, 3, 0.3], *hidden], [WALL] * 998), CELL)
+    many = view_of(NOTHING_SEEN, keypoints([[10, 0, 0.3], [10, 3, 0.3], *hidden], [WALL] * 998))
     for pair in ((many, wall), (wall, many)):
-        found = evidence(*pair, np.eye(4), REACH)
+        found = evidence(*pair, np.eye(4))
         assert found.agree == pytest.approx(0.004)
         assert found.contradict == 0
         assert found.confidence == pytest.approx(0.004 / (0.004 + 0.01))
@@ -98,17 +106,22 @@ def test_the_transformation_moves_the_source(wall):
     assert asked(wall, [[0, -4, 0]], [WALL], np.linalg.inv(T)).agree == 0
 
 
-@pytest.mark.parametrize('reach', [0.3, 0.6, 1.2])
-def test_partners_are_found_up_to_the_reach(reach):
-    """Any direction across the cells of the hash: what a distance matrix says."""
+def test_surfaces_are_found_in_every_direction():
+    """Any direction across the cells of the hash: what a distance matrix says.
+
+    Across the surface a distance counts in full, along it a tenth of its square.
+    """
     rng = np.random.default_rng(0)
     a, b = rng.uniform(-6, 6, (400, 3)), rng.uniform(-6, 6, (300, 3))
     labels_a, labels_b = rng.choice([WALL, POLE], 400), rng.choice([WALL, POLE], 300)
-    gap = np.linalg.norm(a[:, None] - b, axis=-1)
-    same = (gap <= reach) & (labels_a[:, None] == labels_b)
-    found = evidence(view(NOTHING_SEEN, keypoints(a, labels_a), CELL),
-                     view(NOTHING_SEEN, keypoints(b, labels_b), CELL), np.eye(4), reach)
+    gap = a[:, None] - b
+    squared = (gap**2).sum(axis=-1)
+    near = (0.9 * gap[..., 0]**2 + 0.1 * squared <= 0.21**2) & (squared <= REACH**2)
+    same = near & (labels_a[:, None] == labels_b)
+    found = evidence(view_of(NOTHING_SEEN, keypoints(a, labels_a)),
+                     view_of(NOTHING_SEEN, keypoints(b, labels_b)), np.eye(4))
     agree = same.any(axis=1).sum() + same.any(axis=0).sum()
+    assert 20 < agree < 600
     assert found.agree == pytest.approx(agree / (400 + 300))
 
 
@@ -123,7 +136,7 @@ def views(street):
 
 
 def test_a_scan_agrees_with_itself(views):
-    found = evidence(views[0], views[0], np.eye(4), REACH)
+    found = evidence(views[0], views[0], np.eye(4))
     assert found.agree == pytest.approx(1.0)
     assert found.contradict == 0.0
     assert found.confidence > 0.98
@@ -132,7 +145,7 @@ def test_a_scan_agrees_with_itself(views):
 def test_right_and_wrong_poses_of_the_street(views, street):
     """The truth is believed; turned by 90 degrees or 10 m off nothing is."""
     truth = relative(street[1][2], street[0][2])
-    found = evidence(*views, truth, REACH)
+    found = evidence(*views, truth)
     assert found.agree > 0.7
     assert found.confidence > 0.97
     turned, beside, ahead = truth.copy(), truth.copy(), truth.copy()
@@ -140,14 +153,14 @@ def test_right_and_wrong_poses_of_the_street(views, street):
     beside[1, 3] += 10
     ahead[0, 3] += 10
     for wrong in (turned, beside, ahead):
-        assert evidence(*views, wrong, REACH).confidence < 0.75
+        assert evidence(*views, wrong).confidence < 0.75
     ranks = rank(*views, np.array([turned, truth, beside, ahead]))
     assert np.argmax(ranks) == 1
 
 
 def test_both_directions_say_the_same(views, street):
     truth = relative(street[1][2], street[0][2])
-    forth = evidence(*views, truth, REACH)
-    back = evidence(*views[::-1], np.linalg.inv(truth), REACH)
+    forth = evidence(*views, truth)
+    back = evidence(*views[::-1], np.linalg.inv(truth))
     assert forth.agree == pytest.approx(back.agree, abs=0.002)
     assert forth.contradict == pytest.approx(back.contradict, abs=0.002)

@@ -11,16 +11,16 @@ from .common.settings import Settings
 
 @dataclass(frozen=True)
 class SgorConfig(Settings):
-    """Settings of preprocessing and registration; ``SgorConfig()`` is the outdoor preset.
+    """Settings of preprocessing and registration; ``SgorConfig()`` is for any space.
 
-    Where the paper prints no value (all radii and sizes), the defaults were measured; see
-    ``docs/method.md``.
+    Lengths are those for streets; ``scaled`` fits them to smaller spaces. Where the paper prints
+    no value (all radii and sizes), the defaults were measured; see ``docs/method.md``.
     """
 
     scale: float = setting(
-        0.0, 'All other lengths but max_range are those for streets, and multiplied by this; 0: '
-        'it follows from the scans, 1 for streets, a half for a courtyard and so on (beyond the '
-        'paper)', minimum=0.0, maximum=10.0)
+        0.0, 'All lengths but max_range are those for streets and are multiplied by this; 0: it '
+        'follows from the scans, 1 for a street, a half for a courtyard, and so on', minimum=0.0,
+        maximum=10.0)
 
     # scan -> semantic-geometric space (Sec. III-B)
     label_convention: str = setting(
@@ -70,8 +70,8 @@ class SgorConfig(Settings):
     match_within_labels: bool = setting(
         True, 'Match only points of the same regional label (beyond the paper)')
     unlabelled_attempt: bool = setting(
-        True, 'Match what is refused once more by geometry alone: labels may be wrong '
-        '(beyond the paper)')
+        True, 'Match what is refused once more by geometry alone, or, where there are no labels, '
+        'without the context (beyond the paper)')
     height_gate: float = setting(
         0.5, 'Match only points whose heights over the ground differ by less; 0: off '
         '(beyond the paper)', 'm', minimum=0.0, maximum=20.0)
@@ -154,12 +154,12 @@ class SgorConfig(Settings):
 
     @classmethod
     def outdoor(cls) -> Self:
-        """Return the default: a vehicle or robot with a spinning LiDAR."""
+        """Return the default, which follows the scale of the scans."""
         return cls()
 
     @classmethod
     def indoor(cls) -> Self:
-        """Return a preset for rooms and fragments of a few metres."""
+        """Return a preset for rooms and fragments of a few metres, for who wants it fixed."""
         return cls(
             scale=1.0, min_range=0.0, max_range=20.0, voxel_size=0.05, sigma_g=0.03,
             normal_radius=0.10, descriptor_radius=0.25, vote_radius=0.10, context_scale=0.15,
@@ -178,9 +178,11 @@ class SgorConfig(Settings):
 
 @lru_cache(maxsize=32)
 def _scaled[Config: SgorConfig](config: Config, scale: float) -> Config:
-    lengths = {item.name: getattr(config, item.name) * scale for item in config.settings()
-               if item.unit == 'm' and item.name != 'max_range'}
-    bounds = {item.name: (item.minimum, item.maximum) for item in config.settings()}
-    return config.replace(scale=1.0, **{
-        name: min(max(length, bounds[name][0]), bounds[name][1])
-        for name, length in lengths.items()} if scale != 1 else {})
+    lengths = {}
+    for item in config.settings():
+        if item.unit == 'm' and item.name != 'max_range' and scale != 1:
+            length = getattr(config, item.name) * scale
+            # what is off stays off; else a length is never beyond its bounds
+            lengths[item.name] = length and min(max(length, item.minimum or 0.0),
+                                                item.maximum or math.inf)
+    return config.replace(scale=1.0, **lengths)

@@ -84,23 +84,29 @@ def _register(source: SemanticScan | PreparedScan, target: SemanticScan | Prepar
 
 
 def _attempts(config: SgorConfig, *, labelled: bool, level: bool) -> Iterator[SgorConfig]:
-    """Yield the settings of a quick attempt with few keypoints, of all, and without labels.
+    """Yield the settings of each attempt; the first that the clouds believe ends them.
 
-    Where the ground planes may be of walls or tables, each again with whatever is level.
+    A quick one with few keypoints; one with all; one that trusts less: without labels, or, where
+    there are none, without what stands around, which from afar looks another. Where the ground
+    planes may be of walls or tables, nothing stands around, and whatever is level is tried too.
     """
     if not labelled:
         config = config.replace(semantics='none')
-    tilted = config.replace(ground_check=False, height_gate=0.0, context_weight=0.0)
-    ways = (config,) if level or config == tilted else (config, tilted)
+        less = config.replace(context_weight=0.0)
+    else:
+        less = config.replace(semantics='none')
+    ways = (config,) if level else (
+        config.replace(context_weight=0.0),
+        config.replace(context_weight=0.0, ground_check=False, height_gate=0.0))
     if 0 < config.quick_keypoints < config.max_correspondences:
         for way in ways:
             yield way.replace(max_correspondences=config.quick_keypoints,
                               groups=min(config.groups, config.quick_groups),
                               group_size=max(config.quick_keypoints // 8, config.group_keep + 1))
-    yield from ways
-    # without labels it would be the same attempt again
-    if config.unlabelled_attempt and config.semantics != 'none':
-        yield config.replace(semantics='none')
+    yield ways[0]
+    if config.unlabelled_attempt and less not in (config, *ways):    # or the same once more
+        yield less
+    yield from ways[1:]
 
 
 def _globally(source: PreparedScan, target: PreparedScan, config: SgorConfig,

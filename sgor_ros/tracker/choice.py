@@ -116,7 +116,8 @@ def refined(placement: Placement, source: PreparedScan, target: PreparedScan,
     """Return a placement refined on the clouds; what is unknown of it stays unknown."""
     if source.surface is None or target.surface is None:
         return placement
-    local = align(source.surface, target.surface, placement.T_target_source, config)
+    local = align(source.surface, target.surface, placement.T_target_source,
+                  config.scaled(max(source.scale, target.scale)))
     return replace(placement, T_target_source=local.T_target_source, covariance=(
         placement.covariance if _is_loose(placement) else local.covariance))
 

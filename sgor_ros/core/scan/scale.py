@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 
 STREET_VOXEL = 0.5
 """Metres: the grid on which sizes compare, whatever the sensor's density."""
-STREET_SIZE = 14.0
+STREET_SIZE = 7.0
 """Metres: streets have 12 to 30, courtyards 5 to 9, corridors 4 to 5, fragments of rooms 0.7."""
 SMALLEST = 1 / 16
 """Voxels of 3 cm; nothing finer is seen of rooms by depth cameras."""
@@ -22,7 +22,8 @@ def size_of(points: NDArray[np.float64]) -> float:
     """
     if len(points) < 3:
         return STREET_SIZE
-    variances = np.linalg.eigvalsh(np.cov(points.T))
+    centred = points - points.mean(axis=0)    # a quarter of the time of np.cov
+    variances = np.linalg.eigvalsh(centred.T @ centred / len(points))
     return math.sqrt(math.sqrt(max(float(variances[1] * variances[2]), 0.0)))
 
 

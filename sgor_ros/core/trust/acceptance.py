@@ -49,7 +49,11 @@ def compete(result: Registration, source: View, target: View, config: SgorConfig
     if result.T_target_source is None:
         return result, None
     if config.rival_radius > 0:
-        ranked = result.hypotheses[np.argsort(-result.hypothesis_scores, kind='stable')]
+        if not config.ground_check:
+            # what is up may be a wall here, and there the ceiling
+            source, target = replace(source, level=False), replace(target, level=False)
+        order = np.argsort(-result.hypothesis_scores, kind='stable')
+        ranked = result.hypotheses[order[np.isfinite(result.hypothesis_scores[order])]]
         found = contest(source, target, result.T_target_source, ranked, config.rival_radius)
     else:
         T = result.T_target_source[None]

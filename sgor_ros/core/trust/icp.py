@@ -19,27 +19,29 @@ from .view import slot_of
 from .view import View
 
 SAMPLE = 300
-"""Keypoints of the source that are fitted."""
+"""Keypoints of the source that are fitted, where nothing else is asked for."""
 FEWEST_PARTNERS = 10
 """With fewer partners a placement stays where it is."""
 SOFTNESS = 0.4
 """Distances beyond this share of the reach pull less (Geman-McClure)."""
 
 
-def icp(source: View, target: View, T_target_source: NDArray[np.float64], wide: int, narrow: int
-        ) -> NDArray[np.float64]:
+def icp(source: View, target: View, T_target_source: NDArray[np.float64], wide: int, narrow: int,
+        sample: int = SAMPLE) -> NDArray[np.float64]:
     """Fit each of (H, 4, 4) placements.
 
     Parameters
     ----------
     wide, narrow : int
         Rounds with partners up to twice the reach of the views, and up to the reach.
+    sample : int
+        Keypoints of the source to fit.
 
     Returns
     -------
     (H, 4, 4) float64
     """
-    rows = spread(len(source.points), SAMPLE)
+    rows = spread(len(source.points), sample)
     T = np.array(T_target_source)
     _icp(source.points[rows], source.labels[rows], T, target.points, target.normals,
          target.labels, target.cell, target.slots, target.chain, target.reach, wide, narrow)

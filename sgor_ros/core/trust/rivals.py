@@ -36,15 +36,17 @@ from .view import View
 
 TURNS = 4
 """Quarter turns: what people build repeats itself under these."""
-SWEEP_SAMPLE, PEAKS = 250, 4
+SWEEP_SAMPLE, PEAKS = 200, 4
 """Keypoints that are swept over the overhead map, and placements that come of each turn."""
 HYPOTHESES = 6
 """Placements taken from the hypotheses of the solver."""
 WIDE, NARROW = 3, 4
 """Rounds of ICP for each rival."""
+LATE = 10
+"""Rounds of either kind for the few that nothing has ruled out by then."""
 LEAST_SUPPORT = 0.45
 """A rival with less of the agreement of the answer explains too little to be one."""
-FEW, MANY = 300, 1000
+FEW, MANY = 250, 1000
 """Keypoints of each scan asked first, and where that does not rule a rival out."""
 CLEAR_COUNT, CLEAR_SHARE, CLEAR_RATIO = 5, 0.003, 3.0
 """A rival is out when its violations outnumber those of the answer by this count, by this share of
@@ -56,6 +58,8 @@ TUNING = (-0.5, -0.25, 0.25, 0.5)
 STAYS = 0.8
 """A direction is free where a push along it is kept to this share: elsewhere the clouds slide
 back."""
+LEVEL = np.cos(np.radians(10.0))
+"""Least cosine of the ground normals under a rival: slopes and their estimates included."""
 SAME_ANGLE = np.radians(5.0)
 """With the reach, the least difference of two placements."""
 
@@ -100,10 +104,11 @@ def contest(source: View, target: View, T_target_source: NDArray[np.float64],
     weak, lever = weak_directions(source, target, T)
     pushes = PUSH * target.reach * np.vstack((weak, -weak))
     others = icp(source, target, np.concatenate((
-        _apart(hypotheses, T[None], target, HYPOTHESES),
-        correlated(source, target, T, radius))), WIDE, 0)
+        _apart(hypotheses, T, target, HYPOTHESES),
+        correlated(source, target, T, radius))), WIDE, 0, FEW // 2)
     if len(weak):
         others = _along_ridges(source, target, T, others, weak, radius)
+    others = others[_keeps_level(source, target, others)]
     few = testify(source, target, np.concatenate((T[None], others)), FEW)
     rivals = others[~ruled_out(few[0], few[1:])]
     fitted = np.concatenate((T[None], icp(source, target, pushed(T, pushes), WIDE, NARROW),
@@ -113,6 +118,13 @@ def contest(source: View, target: View, T_target_source: NDArray[np.float64],
     if best > 0 and again:
         return contest(source, target, fitted[best], hypotheses, radius, again=False)
     standing = differ(fitted[best], fitted, target) & ~ruled_out(many[best], many)
+    late = standing.copy()
+    late[:1 + len(pushes)] = False
+    if late.any():
+        # some are only on their way to the answer
+        fitted[late] = icp(source, target, fitted[late], LATE, LATE)
+        many[late] = testify(source, target, fitted[late], MANY)
+        standing = differ(fitted[best], fitted, target) & ~ruled_out(many[best], many)
     slides = tuple(
         _measured(source, target, fitted[best], many[best], twist, lever, radius)
         for k, twist in enumerate(weak)
@@ -120,6 +132,15 @@ def contest(source: View, target: View, T_target_source: NDArray[np.float64],
                    pushes[k]))
     standing[1:1 + len(pushes)] = False    # these were asked for the slides
     return _remaining(fitted, many, best, standing, slides, target)
+
+
+def _keeps_level(source: View, target: View, placements: NDArray[np.float64]
+                 ) -> NDArray[np.bool_]:
+    """Return which of (K, 4, 4) placements keep the ground level, as far as it is known, (K,)."""
+    if not (source.level and target.level):
+        return np.ones(len(placements), np.bool_)
+    level: NDArray[np.bool_] = (placements[:, :3, :3] @ source.axes[2]) @ target.axes[2] > LEVEL
+    return level
 
 
 def _slides(placements: NDArray[np.float64], standing: NDArray[np.bool_],
@@ -270,7 +291,8 @@ def correlated(source: View, target: View, T_target_source: NDArray[np.float64],
     # a keypoint marks the cells around its own: every second shift is enough
     half = int(radius / (2 * overhead.edge))
     hits = np.zeros((TURNS, 2 * half + 1, 2 * half + 1), np.int32)
-    _sweep(columns, bits, overhead.cells, half, hits)
+    # even and odd columns apart, so that every second cell is the next one in memory
+    _sweep(columns, bits, np.stack((overhead.cells[:, ::2], overhead.cells[:, 1::2])), half, hits)
     # the placement itself is no rival
     hits[0, half - 1:half + 2, half - 1:half + 2] = 0
     peaks = _peaks(hits, PEAKS)
@@ -330,36 +352,38 @@ def _remaining(placements: NDArray[np.float64], outcomes: NDArray[np.int8], best
     return Contest(T, outcomes[best], placements[kept], outcomes[kept], slides)
 
 
-def _apart(candidates: NDArray[np.float64], taken: NDArray[np.float64], target: View, most: int
+def _apart(candidates: NDArray[np.float64], T: NDArray[np.float64], target: View, most: int
            ) -> NDArray[np.float64]:
-    """Return the first of (H, 4, 4) that differ from those taken and from each other."""
-    kept = list(taken)
-    for T in candidates:
-        if len(kept) - len(taken) == most:
-            break
-        if differ(T, np.array(kept), target).all():
-            kept.append(T)
-    return np.array(kept[len(taken):]).reshape(-1, 4, 4)
+    """Return the first of (H, 4, 4) that differ from T and from each other."""
+    left = candidates[differ(T, candidates, target)]
+    kept: list[NDArray[np.float64]] = []
+    while len(left) and len(kept) < most:
+        kept.append(left[0])
+        left = left[differ(left[0], left, target)]
+    return np.array(kept).reshape(-1, 4, 4)
 
 
 @numba.njit(cache=True, nogil=True, parallel=True)
 def _sweep(columns, bits, cells, half, hits):  # type: ignore[no-untyped-def]
     """Count for each turn and shift, by two cells each, the points whose bit is in their cell."""
-    size, width = cells.shape[0], 2 * half + 1
+    size, width = cells.shape[1], 2 * half + 1
     for task in numba.prange(len(columns) * width):
         turn = np.int64(task) // width
         i = np.int64(task) % width
+        row = hits[turn, i]
         for k in range(columns.shape[1]):
             x = columns[turn, k, 0] + 2 * (i - half)
             if x < 0 or x >= size:
                 continue
-            y = columns[turn, k, 1] - 2 * half
+            # y // 2 and the shifts that stay on the map
+            at = (columns[turn, k, 1] >> 1) - half
+            first, last = max(0, -at), min(width, cells.shape[2] - at)
+            if first >= last:
+                continue
+            run = cells[columns[turn, k, 1] & 1, x, at + first:at + last]
             bit = bits[turn, k]
-            # the shifts that stay on the map
-            first = max(0, (1 - y) // 2)
-            last = min(width, (size - y + 1) // 2)
-            for j in range(first, last):
-                hits[turn, i, j] += np.int32((cells[x, y + 2 * j] & bit) != 0)
+            for j in range(len(run)):
+                row[first + j] += np.int32((run[j] & bit) != 0)
 
 
 @numba.njit(cache=True, nogil=True)

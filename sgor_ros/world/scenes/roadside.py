@@ -84,9 +84,10 @@ def facade(rng: np.random.Generator, cars: str = 'none') -> Place:
 
 def highway(rng: np.random.Generator) -> Place:
     """Build a highway: guard rails, a post every 50 m, and bushes anywhere beyond."""
-    half, median = float(rng.choice([12.0, 13.5])), float(rng.choice([1.5, 2.0]))
-    waves = draw_waves(rng, 8, (8.0, 60.0), 0.15)
-    bank = rng.uniform(-0.06, 0.06, 2)
+    half, median = ((12.0, 1.5), (13.5, 2.0))[int(rng.integers(2))]
+    # Most of them run through level land.
+    waves = draw_waves(rng, 8, (8.0, 60.0), float(rng.choice([0.02, 0.02, 0.15])))
+    bank = rng.uniform(-0.06, 0.06, 2) * (rng.random() < 0.3)
 
     def height(xy: Array) -> Array:
         out = np.abs(xy[:, 1]) - half - 1.5
@@ -108,7 +109,7 @@ def highway(rng: np.random.Generator) -> Place:
             plot.add(POLE, place(post, (x, side * (half + 1.3), 0.0)))
     pool = [bush(rng) for _ in range(30)]
     for side in (-1, 1):
-        for _ in range(int(rng.integers(60, 110))):
+        for _ in range(int(rng.integers(15, 90))):
             spot = (rng.uniform(-_HIGHWAY, _HIGHWAY),
                     side * (half + 2.5 + rng.gamma(1.5, 6.0)))
             plot.put(pool[int(rng.integers(len(pool)))], spot, rng.uniform(0.0, 2 * np.pi))
