@@ -3,8 +3,12 @@ from importlib import import_module
 from typing import Any
 from typing import TYPE_CHECKING
 
+from .cache import choose_cache_folder
+
 if TYPE_CHECKING:
     from .api import *  # noqa: F403
+
+choose_cache_folder()
 
 
 def __getattr__(name: str) -> Any:

@@ -9,9 +9,9 @@ from sgor_ros import InputError
 from sgor_ros import TrackedScan
 from sgor_ros.core.common import se3
 from sgor_ros.io.frames import frame_id
+from sgor_ros.io.frames import OdomFrame
 from sgor_ros.io.frames import of_base
 from sgor_ros.io.frames import parse_transform
-from sgor_ros.io.frames import Placement
 from sgor_ros.io.stream_config import StreamConfig
 
 MOUNT = '1.2 -0.3 1.8 0.05 0.1 1.5'
@@ -21,10 +21,10 @@ def pose(*numbers):
     return parse_transform(' '.join(map(str, numbers)), 'pose')
 
 
-def tracked(T, restarted=False, **values):
+def tracked(T, track_id=1, **values):
     fields = dict.fromkeys(TrackedScan.__dataclass_fields__)
     return TrackedScan(**{**fields, 'success': T is not None, 'T_odom_sensor': T,
-                          'restarted': restarted, **values})
+                          'track_id': track_id, **values})
 
 
 def perturbed(T, xi):
@@ -49,9 +49,9 @@ def test_covariance_is_that_of_moved_noise():
     covariance = root @ root.T
 
     def placed(T, start=mount):
-        placement = Placement()
-        placement.place(tracked(np.eye(4), restarted=True), start)
-        return placement.place(tracked(T, covariance=covariance), mount)
+        odom = OdomFrame()
+        odom.place(tracked(np.eye(4)), start)
+        return odom.place(tracked(T, covariance=covariance), mount)
 
     mean = placed(T)
     J = jacobian(lambda xi: difference(placed(perturbed(T, xi)).T_odom_sensor,
@@ -62,13 +62,17 @@ def test_covariance_is_that_of_moved_noise():
 def test_twist_is_that_of_the_moving_base():
     mount, T = pose(*map(float, MOUNT.split())), pose(10, 4, 1, 0.1, -0.2, 2)
     twist = np.array([6.0, 0.4, -0.2, 0.1, -0.3, 0.8])
+    root = np.random.default_rng(2).normal(size=(6, 6))
+    doubt = root @ root.T
     dt = 1e-6
     moved = T @ se3.compose(Rotation.from_rotvec(twist[3:] * dt).as_matrix(), twist[:3] * dt)
-    before = of_base(tracked(T, twist=twist), mount)
+    before = of_base(tracked(T, twist=twist, twist_covariance=doubt), mount)
     after = of_base(tracked(moved), mount).T_odom_sensor
     step = se3.inverse(before.T_odom_sensor) @ after
     seen = np.concatenate((step[:3, 3], Rotation.from_matrix(step[:3, :3]).as_rotvec())) / dt
     np.testing.assert_allclose(before.twist, seen, atol=1e-4)
+    J = jacobian(lambda xi: of_base(tracked(T, twist=twist + xi), mount).twist)
+    np.testing.assert_allclose(before.twist_covariance, J @ doubt @ J.T, rtol=1e-6, atol=1e-6)
 
 
 def test_a_base_on_a_circle_begins_at_the_origin():
@@ -76,23 +80,23 @@ def test_a_base_on_a_circle_begins_at_the_origin():
     mount = pose(*map(float, MOUNT.split()))
     bases = [pose(5 * np.sin(a), 5 - 5 * np.cos(a), 0, 0, 0, a) for a in (0.0, 0.5, 1.0)]
     sensors = [base @ mount for base in bases]
-    placement = Placement()
-    for first in (0, 1):
+    odom = OdomFrame()
+    for first, track_id in ((0, 1), (1, 2), (0, 1)):    # the last goes on with the first
         for base, sensor in zip(bases[first:], sensors[first:], strict=True):
-            scan = tracked(se3.inverse(sensors[first]) @ sensor, sensor is sensors[first])
-            found = placement.place(scan, mount).T_odom_sensor
+            scan = tracked(se3.inverse(sensors[first]) @ sensor, track_id)
+            found = odom.place(scan, mount).T_odom_sensor
             np.testing.assert_allclose(found, se3.inverse(bases[first]) @ base, atol=1e-12)
-            np.testing.assert_allclose(placement.of_sensor(scan).T_odom_sensor, found @ mount,
+            np.testing.assert_allclose(odom.of_sensor(scan).T_odom_sensor, found @ mount,
                                        atol=1e-12)
 
 
 def test_a_mount_that_turns_leaves_the_base_where_it_is():
     """A panning sensor on a standing robot."""
-    placement = Placement()
+    odom = OdomFrame()
     for angle in (0.0, 0.4, 0.9):
         mount = pose(0.3, 0, 1.0, 0, 0, angle)
-        scan = tracked(se3.inverse(pose(0.3, 0, 1.0, 0, 0, 0)) @ mount, angle == 0)
-        np.testing.assert_allclose(placement.place(scan, mount).T_odom_sensor, np.eye(4),
+        scan = tracked(se3.inverse(pose(0.3, 0, 1.0, 0, 0, 0)) @ mount)
+        np.testing.assert_allclose(odom.place(scan, mount).T_odom_sensor, np.eye(4),
                                    atol=1e-12)
 
 
@@ -104,29 +108,31 @@ def test_doubt_about_the_start_goes_with_the_track(mount):
     start, doubt, T = pose(9, 8, 7, 0.3, 0.2, 1), root @ root.T, pose(10, 4, 1, 0.1, -0.2, 2)
 
     def at(T_start):
-        placement = Placement()
-        placement.begin_at(T_start, doubt)
-        first = placement.place(tracked(np.eye(4), True, covariance=np.zeros((6, 6))), mount)
+        odom = OdomFrame()
+        odom.begin_at(T_start, doubt)
+        first = odom.place(tracked(np.eye(4), covariance=np.zeros((6, 6))), mount)
         np.testing.assert_allclose(first.T_odom_sensor, T_start, atol=1e-12)
         np.testing.assert_allclose(first.covariance, doubt)
-        return placement, placement.place(tracked(T, covariance=np.zeros((6, 6))), mount)
+        return odom, odom.place(tracked(T, covariance=np.zeros((6, 6))), mount)
 
-    placement, mean = at(start)
+    odom, mean = at(start)
     J = jacobian(lambda xi: difference(at(perturbed(start, xi))[1].T_odom_sensor,
                                        mean.T_odom_sensor))
     np.testing.assert_allclose(mean.covariance, J @ doubt @ J.T, rtol=1e-5, atol=1e-6)
-    again = placement.place(tracked(np.eye(4), True, covariance=np.zeros((6, 6))), mount)
+    again = odom.place(tracked(np.eye(4), 2, covariance=np.zeros((6, 6))), mount)
     np.testing.assert_allclose(again.T_odom_sensor, np.eye(4), atol=1e-12)
     np.testing.assert_array_equal(again.covariance, np.zeros((6, 6)))
 
 
 def test_without_a_base_or_a_pose_nothing_changes():
-    placement = Placement()
-    scan = tracked(pose(1, 2, 3, 0, 0, 1), restarted=True, covariance=np.eye(6))
-    assert placement.place(scan, None) is scan
-    assert placement.of_sensor(scan) is scan
-    lost = replace(scan, T_odom_sensor=None, covariance=None, success=False, restarted=False)
-    assert placement.place(lost, np.eye(4)).T_odom_sensor is None
+    odom = OdomFrame()
+    scan = tracked(pose(1, 2, 3, 0, 0, 1), covariance=np.eye(6))
+    for same in (odom.of_sensor(scan), odom.place(scan, None),
+                 odom.of_sensor(scan)):
+        np.testing.assert_allclose(same.T_odom_sensor, scan.T_odom_sensor, atol=1e-15)
+        np.testing.assert_allclose(same.covariance, scan.covariance, atol=1e-15)
+    lost = replace(scan, T_odom_sensor=None, covariance=None, success=False)
+    assert odom.place(lost, np.eye(4)).T_odom_sensor is None
 
 
 def test_the_numbers_are_those_of_a_urdf():

@@ -17,6 +17,7 @@ FILES = {'rosbags', 'matplotlib', 'tqdm', 'argparse'}
 
 # module or folder -> what it may import of the package besides itself
 MAY_IMPORT = {
+    'cache': set(),
     'core': set(),
     'tracker': {'core'},
     'api': {'core', 'tracker'},

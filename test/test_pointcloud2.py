@@ -181,7 +181,9 @@ def tracked(**changes):
         'stamp_ns': 1_700_000_000_123_456_789, 'success': True, 'reason': '',
         'T_odom_sensor': T_odom_sensor, 'covariance': np.arange(36.0).reshape(6, 6),
         'twist': np.arange(6.0), 'registration': result, 'reference_stamp_ns': 5,
-        'keyframe': True, 'restarted': False, 'warnings': (), 'timings': {}}
+        'keyframe': True, 'restarted': False, 'warnings': (), 'timings': {},
+        'twist_covariance': np.arange(36.0).reshape(6, 6) + 1, 'T_reference_sensor': step,
+        'reference_covariance': np.arange(36.0).reshape(6, 6) + 2}
     return TrackedScan(**{**values, **changes})
 
 
@@ -202,10 +204,23 @@ def test_odometry_has_pose_covariance_and_twist_where_ros_has_them():
     np.testing.assert_array_equal(message.pose.covariance, np.arange(36.0))
     assert message.twist.twist.linear.y == 1.0
     assert message.twist.twist.angular.z == 5.0
+    np.testing.assert_array_equal(message.twist.covariance, np.arange(36.0) + 1)
+
+
+def test_a_relative_pose_names_both_scans():
+    message = messages.relative_pose(bag_type, tracked(), 'lidar')
+    assert messages.stamp_ns_of(message.header) == 1_700_000_000_123_456_789
+    assert message.header.frame_id == 'lidar@5'
+    assert message.child_frame_id == 'lidar@1700000000123456789'
+    np.testing.assert_allclose(messages.matrix_of(message.pose.pose),
+                               pose(0.1, (1.0, 0.5, 0.0)), atol=1e-12)
+    np.testing.assert_array_equal(message.pose.covariance, np.arange(36.0) + 2)
+    assert message.twist.covariance[0] > 1e5
 
 
 def test_what_is_unknown_weighs_nothing_in_any_axis():
-    message = messages.odometry(bag_type, tracked(covariance=None), 'odom', 'lidar')
+    message = messages.odometry(
+        bag_type, tracked(covariance=None, twist_covariance=None), 'odom', 'lidar')
     for part in (message.pose, message.twist):
         # a filter inverts it: no axis may be exact, none may be negative
         information = np.linalg.inv(part.covariance.reshape(6, 6))

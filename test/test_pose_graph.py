@@ -96,7 +96,7 @@ def test_a_drive_in_gtsam_ends_where_it_ended(street):
     add_edge = from_docs('add_edge')
     for scan in tracked:
         values.insert(scan.stamp_ns, gtsam.Pose3())
-        if scan.registration is None:
+        if scan.T_reference_sensor is None:
             graph.add(gtsam.PriorFactorPose3(scan.stamp_ns, gtsam.Pose3(),
                                              gtsam.noiseModel.Isotropic.Sigma(6, 1e-4)))
         else:

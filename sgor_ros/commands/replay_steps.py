@@ -16,8 +16,8 @@ from ..io import messages
 from ..io.bags import BagWriter
 from ..io.bags import RecordedCloud
 from ..io.frames import frame_id
+from ..io.frames import OdomFrame
 from ..io.frames import parse_transform
-from ..io.frames import Placement
 from ..io.label_field import choice_in_words
 from ..io.label_field import label_field_of
 from ..io.pointcloud2 import decode
@@ -94,7 +94,7 @@ class Steps:
         self._stream = stream
         self._writer = writer
         self._warnings = warnings
-        self._placement = Placement()
+        self._odom_frame = OdomFrame()
 
     def take(self, cloud: RecordedCloud) -> Row:
         """Track one cloud; a broken one is a row without a pose."""
@@ -113,7 +113,7 @@ class Steps:
             self._warnings.add(text)
         if not tracked.success:
             self._warnings.add(f'scan at {stamp_ns * 1e-9:.3f} s has no pose: {tracked.reason}')
-        placed = self._placement.place(tracked, self._T_base_sensor)
+        placed = self._odom_frame.place(tracked, self._T_base_sensor)
         if self._writer:
             for topic, result in self._results(self._writer.types, tracked, placed, frame):
                 self._writer.write(topic, result, cloud.bag_time_ns)
@@ -130,7 +130,7 @@ class Steps:
             yield '/odometry', messages.odometry(types, placed, odom,
                                                  self._stream.base_frame or sensor)
             yield '/pose', messages.pose_stamped(types, placed, odom)
-            if tracked.registration is not None:
+            if tracked.T_reference_sensor is not None:
                 yield '/relative_pose', messages.relative_pose(types, tracked, sensor)
         yield '/correspondences', messages.correspondence_markers(
-            types, self._placement.of_sensor(tracked), odom)
+            types, self._odom_frame.of_sensor(tracked), odom)

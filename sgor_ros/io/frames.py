@@ -1,4 +1,5 @@
 """The track as others want it: of the vehicle's base in place of the sensor."""
+from dataclasses import dataclass
 from dataclasses import replace
 import re
 
@@ -11,6 +12,8 @@ from ..core.common.settings import InputError
 from ..tracker import TrackedScan
 
 Array = NDArray[np.float64]
+
+REMEMBERED = 100
 
 
 def frame_id(name: str) -> str:
@@ -41,7 +44,7 @@ def in_odom(tracked: TrackedScan, T_odom_start: Array) -> TrackedScan:
     """Return a scan in an odom frame in which the first pose of the sensor is `T_odom_start`."""
     if tracked.T_odom_sensor is None:
         return tracked
-    turn = _turned(T_odom_start[:3, :3])
+    turn = se3.turned(T_odom_start[:3, :3])
     return replace(tracked, T_odom_sensor=T_odom_start @ tracked.T_odom_sensor,
                    covariance=_through(turn, tracked.covariance))
 
@@ -52,25 +55,32 @@ def of_base(tracked: TrackedScan, T_base_sensor: Array) -> TrackedScan:
         return tracked
     T_sensor_base = se3.inverse(T_base_sensor)
     R_odom_sensor, R_base_sensor = tracked.T_odom_sensor[:3, :3], T_base_sensor[:3, :3]
-    twist = None
-    if tracked.twist is not None:
-        twist = _turned(R_base_sensor) @ _moved_by(T_sensor_base[:3, 3]) @ tracked.twist
-    lever = _moved_by(R_odom_sensor @ T_sensor_base[:3, 3])
-    return replace(tracked, T_odom_sensor=tracked.T_odom_sensor @ T_sensor_base, twist=twist,
-                   covariance=_through(lever, tracked.covariance))
+    to_base = se3.turned(R_base_sensor) @ se3.carried(T_sensor_base[:3, 3])
+    lever = se3.carried(R_odom_sensor @ T_sensor_base[:3, 3])
+    return replace(tracked, T_odom_sensor=tracked.T_odom_sensor @ T_sensor_base,
+                   covariance=_through(lever, tracked.covariance),
+                   twist=None if tracked.twist is None else to_base @ tracked.twist,
+                   twist_covariance=_through(to_base, tracked.twist_covariance))
 
 
-class Placement:
-    """Where the poses of a track are published: the node's and the replay's way is one.
+@dataclass(frozen=True, eq=False)
+class _Start:
+    """Where a track begins: the sensor, what is published, and the doubt about the latter."""
+
+    T_odom_sensor: Array
+    T_odom_child: Array
+    covariance: Array
+
+
+class OdomFrame:
+    """The frame that poses are published in, and where each track lies in it.
 
     The frame that is published, base or sensor, begins a track at the origin of the odom frame,
     or where `begin_at` says.
     """
 
     def __init__(self) -> None:
-        self._T_odom_start: Array | None = None    # the first pose of the sensor
-        self._T_odom_child: Array | None = None    # and of what is published, where it was given
-        self._covariance = np.zeros((6, 6))
+        self._starts: dict[int, _Start] = {}
         self._next: tuple[Array, Array] | None = None
 
     def begin_at(self, T_odom_child: Array, covariance: Array) -> None:
@@ -86,46 +96,31 @@ class Placement:
         T_base_sensor : (4, 4) array or None
             At the stamp of the scan; None where the sensor itself is wanted.
         """
-        if tracked.restarted:
-            self._T_odom_start = self._T_odom_child = None
-            if self._next is not None:
-                self._T_odom_child, self._covariance = self._next
-                self._next = None
-        if T_base_sensor is None and self._T_odom_child is None:
+        if tracked.T_odom_sensor is None:
             return tracked
-        if T_base_sensor is None:
-            T_base_sensor = np.eye(4)
-        if self._T_odom_start is None:
-            begin = np.eye(4) if self._T_odom_child is None else self._T_odom_child
-            self._T_odom_start = begin @ T_base_sensor
-        return self._doubted(of_base(in_odom(tracked, self._T_odom_start), T_base_sensor))
+        mount = np.eye(4) if T_base_sensor is None else T_base_sensor
+        start = self._starts.get(tracked.track_id)
+        if start is None:
+            T, covariance = self._next or (np.eye(4), np.zeros((6, 6)))
+            self._next = None
+            # tracks that can come back are few
+            self._starts = dict(list(self._starts.items())[-REMEMBERED:])
+            start = self._starts[tracked.track_id] = _Start(T @ mount, T, covariance)
+        return _doubted(of_base(in_odom(tracked, start.T_odom_sensor), mount), start)
 
     def of_sensor(self, tracked: TrackedScan) -> TrackedScan:
         """Return a scan with the pose of its sensor in the same odom frame."""
-        return tracked if self._T_odom_start is None else in_odom(tracked, self._T_odom_start)
-
-    def _doubted(self, placed: TrackedScan) -> TrackedScan:
-        """Add the doubt about the pose that the track began at."""
-        if self._T_odom_child is None or placed.T_odom_sensor is None or placed.covariance is None:
-            return placed
-        lever = _moved_by(placed.T_odom_sensor[:3, 3] - self._T_odom_child[:3, 3])
-        return replace(placed, covariance=placed.covariance
-                       + lever @ self._covariance @ lever.T)
+        start = self._starts.get(tracked.track_id)
+        return tracked if start is None else in_odom(tracked, start.T_odom_sensor)
 
 
-def _moved_by(lever: Array) -> Array:
-    """Return the (6, 6) map of (shift, turn) at a point to those at another of a rigid body."""
-    x, y, z = lever
-    moved = np.eye(6)
-    moved[:3, 3:] = -np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return moved
-
-
-def _turned(R: Array) -> Array:
-    """Return the (6, 6) map of (shift, turn) in one frame to those in a frame turned by R."""
-    turned = np.zeros((6, 6))
-    turned[:3, :3] = turned[3:, 3:] = R
-    return turned
+def _doubted(placed: TrackedScan, start: _Start) -> TrackedScan:
+    """Add the doubt about the pose that the track began at."""
+    if placed.T_odom_sensor is None or placed.covariance is None:
+        return placed
+    lever = se3.carried(placed.T_odom_sensor[:3, 3] - start.T_odom_child[:3, 3])
+    return replace(placed,
+                   covariance=placed.covariance + lever @ start.covariance @ lever.T)
 
 
 def _through(J: Array, covariance: Array | None) -> Array | None:

@@ -106,32 +106,31 @@ def odometry(types: Types, tracked: TrackedScan, odom_frame: str, sensor_frame: 
     """Return a nav_msgs/msg/Odometry of a scan that has a pose.
 
     The twist is in the sensor frame. What is not known has `UNKNOWN_VARIANCE` on the diagonal of
-    its covariance: the pose where a step gave no covariance, and the twist always.
+    its covariance.
     """
     return odometry_of(types, _pose_of(tracked), tracked.stamp_ns, odom_frame, sensor_frame,
-                       tracked.covariance, tracked.twist)
+                       tracked.covariance, tracked.twist, tracked.twist_covariance)
 
 
 def relative_pose(types: Types, tracked: TrackedScan, sensor_frame: str) -> Any:
     """Return a nav_msgs/msg/Odometry of the step from a scan to its reference: a graph's edge.
 
     Both frames carry the stamps of their scans: ``lidar@100200000000`` is where `sensor_frame`
-    was then. The pose of the scan (child) in the reference is T_target_source, its covariance
-    that of the registration alone.
+    was then. The pose is that of the scan (child) in the reference, its covariance that of this
+    step alone.
     """
-    step, reference_ns = tracked.registration, tracked.reference_stamp_ns
-    assert step is not None, 'only scans with a step are relative to something'
-    assert step.T_target_source is not None
-    assert reference_ns is not None
-    return odometry_of(types, step.T_target_source, tracked.stamp_ns,
-                       f'{sensor_frame}@{reference_ns}', f'{sensor_frame}@{tracked.stamp_ns}',
-                       step.covariance)
+    T_reference_sensor = tracked.T_reference_sensor
+    assert T_reference_sensor is not None, 'only scans with a step are relative to something'
+    return odometry_of(types, T_reference_sensor, tracked.stamp_ns,
+                       f'{sensor_frame}@{tracked.reference_stamp_ns}',
+                       f'{sensor_frame}@{tracked.stamp_ns}', tracked.reference_covariance)
 
 
 def odometry_of(types: Types, T: NDArray[np.float64], stamp_ns: int, frame: str,
                 child_frame: str, covariance: NDArray[np.float64] | None = None,
-                twist: NDArray[np.float64] | None = None) -> Any:
-    """Return a nav_msgs/msg/Odometry of a (4, 4) pose, (6, 6) covariance and (6,) twist."""
+                twist: NDArray[np.float64] | None = None,
+                twist_covariance: NDArray[np.float64] | None = None) -> Any:
+    """Return a nav_msgs/msg/Odometry of a (4, 4) pose and a (6,) twist, with covariances."""
     vector = types('geometry_msgs/msg/Vector3')
     velocity = np.zeros(6) if twist is None else twist
     return types('nav_msgs/msg/Odometry')(
@@ -141,7 +140,7 @@ def odometry_of(types: Types, T: NDArray[np.float64], stamp_ns: int, frame: str,
         twist=types('geometry_msgs/msg/TwistWithCovariance')(
             twist=types('geometry_msgs/msg/Twist')(
                 linear=_point(vector, velocity[:3]), angular=_point(vector, velocity[3:])),
-            covariance=_covariance(None)))
+            covariance=_covariance(None if twist is None else twist_covariance)))
 
 
 def correspondence_markers(types: Types, tracked: TrackedScan, odom_frame: str) -> Any:
@@ -152,11 +151,11 @@ def correspondence_markers(types: Types, tracked: TrackedScan, odom_frame: str) 
     the display.
     """
     markers = types('visualization_msgs/msg/MarkerArray')
-    step = tracked.registration
-    if tracked.T_odom_sensor is None or step is None or step.T_target_source is None:
+    step, T_reference_sensor = tracked.registration, tracked.T_reference_sensor
+    if tracked.T_odom_sensor is None or step is None or T_reference_sensor is None:
         return markers(markers=[_marker(types, tracked.stamp_ns, odom_frame, '', DELETE_ALL,
                                         REJECTED_COLOUR, [])])
-    ends = _ends_in_odom(tracked.T_odom_sensor, step.T_target_source, step)
+    ends = _ends_in_odom(tracked.T_odom_sensor, T_reference_sensor, step)
     point = types('geometry_msgs/msg/Point')
     shown = []
     for namespace, rows, limit, colour in (
@@ -168,10 +167,10 @@ def correspondence_markers(types: Types, tracked: TrackedScan, odom_frame: str) 
     return markers(markers=shown)
 
 
-def _ends_in_odom(T_odom_sensor: NDArray[np.float64], T_target_source: NDArray[np.float64],
+def _ends_in_odom(T_odom_sensor: NDArray[np.float64], T_reference_sensor: NDArray[np.float64],
                   step: Registration) -> NDArray[np.float64]:
     """Return (K, 2, 3) ends of the matches."""
-    T_odom_reference = T_odom_sensor @ se3.inverse(T_target_source)
+    T_odom_reference = T_odom_sensor @ se3.inverse(T_reference_sensor)
     return np.stack((se3.transform(T_odom_sensor, step.source_points),
                      se3.transform(T_odom_reference, step.target_points)), axis=1)
 

@@ -5,8 +5,8 @@ from rclpy.node import Node
 from visualization_msgs.msg import MarkerArray
 
 from ..io import messages
+from ..io.frames import OdomFrame
 from ..io.frames import parse_transform
-from ..io.frames import Placement
 from ..tracker import TrackedScan
 from . import base
 from .parameters import NodeConfig
@@ -34,18 +34,18 @@ class Outputs:
             self._extrinsic = base.fixed(parse_transform(config.T_base_sensor, 'T_base_sensor'))
         elif config.base_frame:
             self._extrinsic = base.by_tf2(node, config.base_frame)
-        self.placement = Placement()
+        self.odom_frame = OdomFrame()
 
     def publish(self, tracked: TrackedScan, sensor_frame: str) -> str:
         """Send what there is of a scan; return why it has no pose although it was registered."""
         trouble = ''
         if tracked.success:
-            if tracked.registration is not None:
+            if tracked.T_reference_sensor is not None:
                 self._relative.publish(messages.relative_pose(ros_type, tracked, sensor_frame))
             trouble = self._publish_pose(tracked, sensor_frame)
         if not trouble and self._markers.get_subscription_count():
             self._markers.publish(messages.correspondence_markers(
-                ros_type, self.placement.of_sensor(tracked), self._odom))
+                ros_type, self.odom_frame.of_sensor(tracked), self._odom))
         return trouble
 
     def _publish_pose(self, tracked: TrackedScan, sensor_frame: str) -> str:
@@ -53,7 +53,7 @@ class Outputs:
         T_base_sensor = self._extrinsic and self._extrinsic(tracked.stamp_ns, sensor_frame)
         if isinstance(T_base_sensor, str):
             return T_base_sensor
-        placed = self.placement.place(tracked, T_base_sensor)
+        placed = self.odom_frame.place(tracked, T_base_sensor)
         frame = self._base or sensor_frame
         self._odometry.publish(messages.odometry(ros_type, placed, self._odom, frame))
         self._pose.publish(messages.pose_stamped(ros_type, placed, self._odom))

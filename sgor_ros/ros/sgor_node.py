@@ -14,6 +14,7 @@ from ..io.frames import frame_id
 from ..io.label_field import choice_in_words
 from ..io.label_field import label_field_of
 from ..io.pointcloud2 import decode
+from ..tracker import State
 from ..tracker import TrackedScan
 from ..tracker import Tracker
 from . import status
@@ -54,7 +55,7 @@ class SgorNode(Node):
         self._commands = Commands(self, self._config.odom_frame)
         self._slot: NewestSlot[tuple[PointCloud2, float]] = NewestSlot()
         self._gaps = Gaps()
-        self._processed = self._failed = self._paused = 0
+        self._processed = self._failed = self._late = self._paused = 0
         self._frame = ''
         self._log = SparingLog(self.get_logger())
         self._health = Health(self, self._log, self.counts, self._idle)
@@ -81,7 +82,7 @@ class SgorNode(Node):
     def counts(self) -> status.Counts:
         """Return what became of the scans so far."""
         return status.Counts(self._slot.received, self._processed, self._slot.replaced,
-                             self._failed, self._gaps.missed, self._paused)
+                             self._failed, self._late, self._gaps.missed, self._paused)
 
     def _idle(self) -> tuple[bytes, str]:
         """Return level and words for what is going on while no scan is told of."""
@@ -142,8 +143,10 @@ class SgorNode(Node):
             self._failed += 1
             level, message, values = status.ERROR, f'unusable cloud: {error}', {}
         else:
+            late = tracked.state is State.LATE
             self._processed += tracked.success
-            self._failed += not tracked.success
+            self._late += late
+            self._failed += not tracked.success and not late
             unplaced = self._outputs.publish(tracked, frame)
             level, message = status.judged(tracked, unplaced)
             values = status.details(tracked)
@@ -156,7 +159,7 @@ class SgorNode(Node):
         self._tracker.config, self._tracker.tracker_config = self._settings.live
         reset, start = self._commands.take()
         if start is not None:
-            self._outputs.placement.begin_at(*start)
+            self._outputs.odom_frame.begin_at(*start)
         if reset:
             self._tracker.reset()
         label_field = self._config.label_field
@@ -166,5 +169,5 @@ class SgorNode(Node):
         if before in ('', frame) or tracked.restarted:
             return tracked
         # the pose is right all the same, the motion is not that of one sensor
-        return replace(tracked, twist=None, warnings=(
+        return replace(tracked, twist=None, twist_covariance=None, warnings=(
             *tracked.warnings, f'the frame of the clouds changed from {before} to {frame}'))

@@ -6,6 +6,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from diagnostic_msgs.msg import KeyValue
 
 from ..io.messages import header
+from ..tracker import State
 from ..tracker import TrackedScan
 from .types import ros_type
 
@@ -15,7 +16,7 @@ STALE = DiagnosticStatus.STALE
 
 @dataclass
 class Counts:
-    """Scans since the start: received = processed + failed + replaced + the one at work.
+    """Scans since the start: received = processed + failed + late + replaced + the one at work.
 
     Before those, `missed` never came, by their stamps, and `paused` came while the node paused.
     """
@@ -24,13 +25,14 @@ class Counts:
     processed: int = 0
     replaced: int = 0
     failed: int = 0
+    late: int = 0
     missed: int = 0
     paused: int = 0
 
     def __str__(self) -> str:
-        """Return the counts in one line, without what never happened before the count."""
+        """Return the counts in one line, without the rare ones that never happened."""
         return ', '.join(f'{name} {count}' for name, count in vars(self).items()
-                         if count or name not in ('missed', 'paused'))
+                         if count or name not in ('late', 'missed', 'paused'))
 
 
 def diagnostics(name: str, frame: str, stamp_ns: int, level: bytes, message: str, counts: Counts,
@@ -53,19 +55,28 @@ def judged(tracked: TrackedScan, unplaced: str) -> tuple[bytes, str]:
     unplaced : str
         Why its pose could not be published; empty where nothing was in the way.
     """
+    if tracked.state is State.LATE:
+        return WARN, f'dropped, for it came late: {tracked.reason}'
     if not tracked.success:
-        return ERROR, '; '.join((f'registration failed: {tracked.reason}', *tracked.warnings))
-    if unplaced:
-        return WARN, '; '.join((f'nothing is published: {unplaced}', *tracked.warnings))
-    if tracked.warnings:
+        level, message = ERROR, f'registration failed: {tracked.reason}'
+        if tracked.state is State.LOST:
+            message = f'lost, {tracked.failures} scans without a pose: {tracked.reason}'
+    elif unplaced:
+        level, message = WARN, f'nothing is published: {unplaced}'
+    elif tracked.state is State.DEGENERATE:
+        level, message = WARN, 'degenerate: some directions are predicted'
+    elif tracked.warnings:
         return WARN, '; '.join(tracked.warnings)
-    return OK, 'first scan of a track' if tracked.restarted else 'registered'
+    else:
+        return OK, 'first scan of a track' if tracked.restarted else 'registered'
+    return level, '; '.join((message, *tracked.warnings))
 
 
 def details(tracked: TrackedScan) -> dict[str, str]:
     """Return what a person wants to see of a scan, as text."""
     step = tracked.registration
-    shown = {'reason': tracked.reason}
+    shown = {'state': tracked.state.value, 'track': str(tracked.track_id),
+             'reason': tracked.reason}
     if step is not None:
         shown['confidence'] = f'{step.confidence:.3f}'
         shown['inliers'] = str(int(step.inliers.sum()))
