@@ -40,8 +40,8 @@ WITHOUT: tuple[dict[str, Any], ...] = (
     {'match_within_labels': False}, {'height_gate': 0.0}, {'context_weight': 0.0},
     {'cloud_check': False}, {'robust_ground': False}, {'drop_ground_labels': False},
     {'quick_keypoints': 0}, {'local_refinement': False}, {'refinement_rounds': 1},
-    {'moving_vote': True}, {'unlabelled_attempt': False}, {'rival_radius': 0.0}, {'min_confidence': 0.0},
-    {'scale': 1.0},
+    {'moving_vote': True}, {'unlabelled_attempt': False}, {'rival_radius': 0.0},
+    {'min_confidence': 0.0}, {'scale': 1.0},
     {'weight_cutoff': SgorConfig.paper().weight_cutoff})
 # ablations 1, 3, 5, 6 and 8 of the paper
 PAPER_WITHOUT: tuple[dict[str, Any], ...] = (
