@@ -11,6 +11,7 @@ from sgor_ros.core.config import SgorConfig
 from sgor_ros.evaluation import pairs as pairing
 from sgor_ros.evaluation import report
 from sgor_ros.evaluation import solver
+from sgor_ros.evaluation.metrics import THREE_SIGMA
 from sgor_ros.evaluation.pairs import Drive
 from sgor_ros.evaluation.pairs import Pair
 from sgor_ros.evaluation.rivals import Answer
@@ -327,6 +328,30 @@ def test_sequence_command(sequences_folder, tmp_path):
             assert [int(r['scan']) for r in own] == list(range(scans))
             assert float(own[-1]['off_the_truth_m']) < 0.1
     assert 'small_gicp, scan to scan' in {r['method'] for r in rows}
+    # what the tracker claims of itself; the rivals claim nothing
+    for r in rows:
+        assert (r['state'] == '') is not r['method'].startswith('SGOR')
+        if r['state'] == 'tracking':
+            assert float(r['error_m']) == pytest.approx(float(r['off_the_truth_m']), abs=1e-6)
+            assert 0.002 < float(r['claimed_m']) < 0.5
+            assert float(r['pose_nees']) < THREE_SIGMA
+
+
+def test_sequence_command_through_places(tmp_path):
+    out = tmp_path / 'out'
+    assert main(['sequence', '--scans', '0', '--per-kind', '4', '--kinds', 'field', 'tunnel',
+                 '--no-labels', '--seed', '2', '--output', str(out)]) == 0
+    rows = rows_of(out)
+    methods = {f'SGOR, {mode}{labels}' for mode in ('consecutive', 'keyframe')
+               for labels in ('', ', no labels')}
+    assert {(r['drive'], r['method']) for r in rows} == {
+        (kind, method) for kind in ('field', 'tunnel') for method in methods}
+    states = {kind: [r['state'] for r in rows if r['drive'] == kind and int(r['scan'])]
+              for kind in ('field', 'tunnel')}
+    assert set(states['field']) == {'tracking'}
+    assert 'tracking' not in states['tunnel']
+    table = (out / 'table.md').read_text()
+    assert 'tunnel: SGOR, keyframe, no labels | 4 | 0%' in table
 
 
 def test_solver_command(tmp_path):

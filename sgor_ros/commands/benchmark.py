@@ -21,6 +21,8 @@ from ..evaluation import run as running
 from ..evaluation import sequences
 from ..evaluation import solver
 from ..evaluation import trust
+from ..evaluation.honesty_table import honesty_table
+from ..evaluation.honesty_table import RULE
 from ..evaluation.pairs import Drive
 from ..evaluation.pairs import Pair
 from ..evaluation.run import Method
@@ -28,6 +30,7 @@ from ..evaluation.run import sgor
 from ..evaluation.trust_plots import plot_reliability
 from .benchmark_options import benchmark_parser
 from .options import run
+from .scene_pairs import scene_drive
 from .scene_pairs import scene_kinds
 from .scene_pairs import scene_pairs
 
@@ -40,7 +43,8 @@ WITHOUT: tuple[dict[str, Any], ...] = (
     {'match_within_labels': False}, {'height_gate': 0.0}, {'context_weight': 0.0},
     {'cloud_check': False}, {'robust_ground': False}, {'drop_ground_labels': False},
     {'quick_keypoints': 0}, {'local_refinement': False}, {'refinement_rounds': 1},
-    {'moving_vote': True}, {'unlabelled_attempt': False}, {'min_confidence': 0.0},
+    {'moving_vote': True}, {'unlabelled_attempt': False}, {'rival_radius': 0.0},
+    {'min_confidence': 0.0}, {'scale': 1.0},
     {'weight_cutoff': SgorConfig.paper().weight_cutoff})
 # ablations 1, 3, 5, 6 and 8 of the paper
 PAPER_WITHOUT: tuple[dict[str, Any], ...] = (
@@ -136,19 +140,28 @@ def ablation(arguments: Namespace) -> int:
 
 
 def sequence(arguments: Namespace) -> int:
-    """Compare odometries on drives."""
+    """Compare odometries on drives, and what the tracker says of itself with the truth."""
     config = _config(arguments)
     drives = [drive for drive in _data_drives(arguments) if drive.T_world_sensor is not None
               and drive.heights_known and len(drive.frames) > 1]
     drives = [Drive(drive.name, drive.frames[:arguments.scans], drive.T_world_sensor)
-              for drive in drives]
-    if _wants_world(arguments):
+              for drive in drives if arguments.scans > 1]
+    if _wants_world(arguments) and arguments.scans > 1:
         drives.append(_world(arguments.seed, arguments.scans, arguments.speed))
-    if not drives:
-        raise InputError(f'{arguments.data}: no drive with two scans and poses.txt, good in z')
-    makers = sequences.odometries(config, _say)
+    kinds = (scene_kinds(arguments.kinds or ())
+             if _wants_world(arguments) and arguments.per_kind > 1 else {})
+    if not drives and not kinds:
+        raise InputError(f'{arguments.data or "world"}: no drive with two scans and poses.txt, '
+                         'good in z')
+    makers = sequences.odometries(config, _say, unlabelled=arguments.no_labels)
     tracks = [track for drive in drives for track in sequences.run_drive(drive, makers, config)]
-    _finish(arguments, report.sequence_table(tracks), report.scan_records(tracks), 0, 0)
+    makers = sequences.trackers(config, unlabelled=arguments.no_labels)
+    for number, kind in enumerate(kinds, 1):
+        _say(f'{kind}, {number} of {len(kinds)} kinds: scanning')
+        drive = scene_drive(kind, arguments.per_kind, arguments.seed)
+        tracks += sequences.run_drive(drive, makers, config)
+    text = '\n\n'.join((report.sequence_table(tracks), honesty_table(tracks), RULE))
+    _finish(arguments, text, report.scan_records(tracks), 0, 0)
     plots.plot_sequences(arguments.output / 'plot.png', tracks)
     return 0
 

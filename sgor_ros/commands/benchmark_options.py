@@ -28,7 +28,6 @@ def benchmark_parser() -> ArgumentParser:
     two.add_argument('--per-kind', type=_count, default=10, metavar='COUNT', help='pairs of the '
                      'same place, and of different places, of each kind in the built-in world: '
                      'tunnels, corridors, facades and others that repeat themselves')
-    two.add_argument('--kinds', nargs='+', metavar='KIND', help='of those; default: all')
     for command, whole in ((one, _positive), (two, _count)):
         command.add_argument('--limit', type=whole, default=300, help='right pairs, chosen at '
                              'random and evenly over data sets and distances')
@@ -37,8 +36,15 @@ def benchmark_parser() -> ArgumentParser:
     for command in (one, two, three):
         command.add_argument('--max-distance', type=float, default=36.0, metavar='M',
                              help='between the sensors of a right pair')
-    four = _add(commands, 'sequence', 'odometry: drift and time a scan')
-    four.add_argument('--scans', type=_positive, default=120, help='of each drive')
+    four = _add(commands, 'sequence', 'odometry: drift, time a scan, and '
+                'whether its covariance holds')
+    four.add_argument('--scans', type=_count, default=120, help='of each drive, and of the '
+                      'street of the built-in world; 0: none')
+    four.add_argument('--per-kind', type=_count, default=40, metavar='COUNT', help='scans of a '
+                      'drive through each other kind of place in the built-in world; 0: none')
+    four.add_argument('--no-labels', action='store_true', help='also track without labels')
+    for command in (two, four):
+        command.add_argument('--kinds', nargs='+', metavar='KIND', help='of those; default: all')
     four.add_argument('--speed', type=float, default=6.0, metavar='M/S', help='in the world')
     five = _add(commands, 'solver', 'time of the solver against the count of matches')
     five.add_argument('--counts', type=_positive, nargs='+',

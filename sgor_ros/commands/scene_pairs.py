@@ -1,4 +1,4 @@
-"""Pairs of scans in the places of the built-in world that repeat themselves."""
+"""Pairs and drives in the places of the built-in world, most of which repeat themselves."""
 from collections.abc import Sequence
 
 import numpy as np
@@ -6,6 +6,8 @@ from numpy.typing import NDArray
 
 from ..core.common import se3
 from ..core.common.settings import InputError
+from ..evaluation.pairs import Drive
+from ..evaluation.pairs import drive_of
 from ..evaluation.pairs import Frame
 from ..evaluation.pairs import frame_in_memory
 from ..evaluation.pairs import Pair
@@ -69,3 +71,9 @@ def scene_pairs(kind: str, count: int, seed: int) -> list[Pair]:
                              se3.inverse(T_world_target) @ T_world_source))
     return same + [Pair(pair.source, target, None, right=False)
                    for pair, target in zip(same, targets[1:], strict=True)]
+
+
+def scene_drive(kind: str, count: int, seed: int) -> Drive:
+    """Drive through the place of a kind and a seed, as far apart as its scans are meant to be."""
+    from ..world import simulate
+    return drive_of(kind, (scan[1:] for scan in simulate(count, seed, place=kind)))

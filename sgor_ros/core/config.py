@@ -19,8 +19,8 @@ class SgorConfig(Settings):
 
     scale: float = setting(
         0.0, 'All lengths but max_range are those for streets and are multiplied by this; 0: it '
-        'follows from the scans, 1 for a street, a half for a courtyard, and so on', minimum=0.0,
-        maximum=10.0)
+        'follows from the scans, 1 for streets and courtyards, a half for corridors, and so on',
+        minimum=0.0, maximum=10.0)
 
     # scan -> semantic-geometric space (Sec. III-B)
     label_convention: str = setting(

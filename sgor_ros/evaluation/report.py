@@ -3,6 +3,8 @@ from collections.abc import Callable
 from collections.abc import Iterable
 from collections.abc import Sequence
 import csv
+from dataclasses import asdict
+from dataclasses import fields
 import json
 import math
 from pathlib import Path
@@ -13,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..io.environment import describe_environment
-from .nees import BOUND
+from .honesty import Said
 from .run import MAX_RE_DEG
 from .run import MAX_TE_M
 from .run import Row
@@ -24,6 +26,8 @@ from .solver import Solved
 BANDS_M = ((0.0, 10.0), (10.0, 20.0), (20.0, 36.0))
 ENOUGH = 20
 """With fewer runs a time is no figure."""
+
+_SAID = [field.name for field in fields(Said)]
 
 PACKAGES = ('sgor_ros', 'numpy', 'scipy', 'numba', 'small_gicp', 'kiss_matcher', 'kiss-icp',
             'open3d-cpu', 'open3d')
@@ -125,24 +129,18 @@ def sequence_table(tracks: Sequence[Track]) -> str:
             f'{track.lengths_m[0]:g}-{track.lengths_m[-1]:g}',
             f'{found.drift.translation_percent:.2f}', f'{found.drift.rotation_deg_per_m:.4f}',
             f'{100 * np.median(found.translation_m):.1f}', f'{np.median(found.rotation_deg):.3f}',
-            _honesty(track.relative_nees), _honesty(track.absolute_nees),
             str(track.without_pose), times(track.seconds[SETTLED:])])
     return markdown(['drive: method', 'scans', 'way [m]', 'stretches [m]', 'drift [%]',
                      'drift [deg/m]', 'TE of a step [cm]', 'RE of a step [deg]',
-                     'NEES of a step', 'NEES of a pose', 'without a pose', 'time a scan [ms]'],
-                    lines)
-
-
-def _honesty(nees: NDArray[np.float64]) -> str:
-    """Return the mean, 6 where a covariance is right, and the share below the bound of 99.7 %."""
-    return f'{nees.mean():.1f}, {np.mean(nees < BOUND):.0%}' if len(nees) else '-'
+                     'without a pose', 'time a scan [ms]'], lines)
 
 
 def scan_records(tracks: Sequence[Track]) -> list[dict[str, Any]]:
-    """Return a line a scan: error of the pose and time."""
+    """Return a line a scan: error of the pose and time, and what the tracker said of it."""
     return [{'drive': track.drive, 'method': track.method, 'scan': scan,
              'off_the_truth_m': float(np.linalg.norm(estimate[:3, 3] - truth[:3, 3])),
-             'seconds': seconds}
+             'seconds': seconds,
+             **(asdict(track.said[scan]) if track.said else dict.fromkeys(_SAID, ''))}
             for track in tracks for scan, (estimate, truth, seconds) in enumerate(
                 zip(track.errors.estimate, track.truth, track.seconds, strict=True))]
 

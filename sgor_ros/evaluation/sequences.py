@@ -17,8 +17,9 @@ from ..core.warmup import warm_up
 from ..tracker import TrackedScan
 from ..tracker import Tracker
 from ..tracker import TrackerConfig
+from .honesty import Said
+from .honesty import what_was_said
 from .metrics import KITTI_LENGTHS_M
-from .nees import track_nees
 from .pairs import Drive
 from .rivals import kiss_icp
 from .rivals import scan_to_scan
@@ -49,8 +50,8 @@ class Track:
         Stretches that the drift was measured over.
     without_pose : int
     seconds : (N,) float64
-    relative_nees, absolute_nees : (K,) float64
-        Of `track_nees`; empty where the odometry gives no covariance.
+    said : list of Said
+        For each scan; empty where the odometry says nothing but poses.
     """
 
     method: str
@@ -60,15 +61,20 @@ class Track:
     lengths_m: tuple[float, ...]
     without_pose: int
     seconds: Array
-    relative_nees: Array
-    absolute_nees: Array
+    said: list[Said]
 
 
-def odometries(config: SgorConfig, say: Callable[[str], None]) -> dict[str, Callable[[], Step]]:
+def trackers(config: SgorConfig, *, unlabelled: bool) -> dict[str, Callable[[], Step]]:
+    """Return what makes the tracker, by the name of its mode; also without labels if asked."""
+    return {f'SGOR, {mode}{"" if labels else ", no labels"}':
+            lambda mode=mode, labels=labels: _Sgor(config, mode, labels)    # type: ignore[misc]
+            for labels in (True, False)[:1 + unlabelled] for mode in ('consecutive', 'keyframe')}
+
+
+def odometries(config: SgorConfig, say: Callable[[str], None], *, unlabelled: bool = False
+               ) -> dict[str, Callable[[], Step]]:
     """Return what makes each odometry, by name; rivals where they are installed."""
-    makers: dict[str, Callable[[], Step]] = {
-        f'SGOR, {mode}': lambda mode=mode: _Sgor(config, mode)    # type: ignore[misc]
-        for mode in ('consecutive', 'keyframe')}
+    makers = trackers(config, unlabelled=unlabelled)
     if find_spec('kiss_icp') is None:
         say("kiss_icp is not installed, so left out; pip install 'sgor_ros[benchmark]'")
     else:
@@ -80,13 +86,15 @@ def odometries(config: SgorConfig, say: Callable[[str], None]) -> dict[str, Call
 class _Sgor:
     """The tracker, and what it said of each scan."""
 
-    def __init__(self, config: SgorConfig, mode: str) -> None:
+    def __init__(self, config: SgorConfig, mode: str, labels: bool) -> None:
         self._tracker = Tracker(config, TrackerConfig(mode=mode))
+        self._labels = labels
         self.tracked: list[TrackedScan] = []
 
     def __call__(self, scan: SemanticScan) -> Array | None:
         # built anew, as a raw scan has to be
-        result = self._tracker.track(SemanticScan(scan.points, scan.labels),
+        labels = scan.labels if self._labels else np.zeros_like(scan.labels)
+        result = self._tracker.track(SemanticScan(scan.points, labels),
                                      (len(self.tracked) + 1) * PERIOD_NS)
         self.tracked.append(replace(result, registration=None))
         return result.T_odom_sensor
@@ -132,5 +140,4 @@ def _track(method: str, drive: str, poses: Sequence[Array | None], truth: Array,
     lengths = tuple(round(length * shrink, 2) for length in KITTI_LENGTHS_M)
     return Track(method, drive, track_errors(np.array(held), truth, lengths), truth, lengths,
                  sum(T is None for T in poses), np.array(list(seconds)),
-                 *track_nees(odometry.tracked if isinstance(odometry, _Sgor) else [],
-                             truth if isinstance(odometry, _Sgor) else truth[:0]))
+                 what_was_said(odometry.tracked, truth) if isinstance(odometry, _Sgor) else [])

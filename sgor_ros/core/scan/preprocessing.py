@@ -31,6 +31,7 @@ from .scale import STREET_VOXEL
 from .scan import Given
 from .scan import PreparedScan
 from .scan import SemanticScan
+from .voxels import shift_of
 from .voxels import thin
 from .voxels import voxel_grid
 from .voxels import VoxelCloud
@@ -86,7 +87,7 @@ def _prepare(scan: SemanticScan, asked: SgorConfig, given: Given | None,
     with clock('voxel grid'):
         scale, config = asked.scale or 1.0, asked.scaled(asked.scale or 1.0)
         points, labels, warnings = _usable(scan, convention, config)
-        cloud = voxel_grid(points, labels, config.voxel_size)
+        cloud = voxel_grid(points, labels, config.voxel_size, shift_of(points))
         if asked.scale == 0:
             even = cloud if config.voxel_size == STREET_VOXEL else voxel_grid(
                 points, labels, STREET_VOXEL)
@@ -94,7 +95,7 @@ def _prepare(scan: SemanticScan, asked: SgorConfig, given: Given | None,
             if scale != 1:
                 config = asked.scaled(scale)
                 points, labels, warnings = _usable(scan, convention, config)
-                cloud = voxel_grid(points, labels, config.voxel_size)
+                cloud = voxel_grid(points, labels, config.voxel_size, shift_of(points))
         if len(cloud.points) > config.max_voxels:
             warnings.append(f'{len(cloud.points)} voxels thinned to {config.max_voxels}')
             cloud = cloud[thin(len(cloud.points), config.max_voxels)]
