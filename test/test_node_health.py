@@ -3,6 +3,7 @@ import subprocess
 import sys
 
 from geometry_msgs.msg import PoseWithCovarianceStamped
+from nav_msgs.msg import Odometry
 import numpy as np
 import pytest
 from rclpy.qos import ReliabilityPolicy
@@ -161,6 +162,7 @@ def test_set_pose_begins_a_track_there(pair, scans):
 
 def test_a_frame_that_changes_is_told_and_has_no_slash(pair, scans):
     node, partner = pair()
+    edges = partner.hear(Odometry, '/relative_pose')
     for scan, frame in zip(scans, ('/front', '/front', '/rear', '/rear'), strict=False):
         level, words, _ = partner.outcome(cloud_of(scan, frame))
         changed = frame == '/rear' and scan is scans[2]
@@ -170,6 +172,9 @@ def test_a_frame_that_changes_is_told_and_has_no_slash(pair, scans):
     assert [odometry.child_frame_id for odometry in partner.odometry] == [
         'front', 'front', 'rear', 'rear']
     assert partner.odometry[2].twist.covariance[0] > 1e5    # not the motion of one sensor
+    partner.spin_until(lambda: len(edges) == 3)
+    assert edges[1].header.frame_id.startswith('front@')
+    assert edges[1].child_frame_id.startswith('rear@')
     assert 'changed from front to rear' in node.log.read_text()
     assert node.stop() == 0
 

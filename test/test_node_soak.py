@@ -15,6 +15,8 @@ from sgor_ros.ros.player import NodeProcess
 SCANS = int(os.environ.get('SGOR_SOAK', '200'))
 ROUND = 40
 SAMPLES = 20
+# of the way: there is no map, so the odometry of a long drive drifts
+DRIFT = 0.001
 
 
 def state(node):
@@ -28,7 +30,8 @@ def state(node):
 def test_rounds_without_growth_or_loss(tmp_path):
     drive = {stamp: scan for stamp, *scan in street(ROUND)}
     origin = np.linalg.inv(drive[ros.START_NS][2])
-    samples, seconds, errors_m = [], [], []
+    samples, seconds, errors_m, way_m = [], [], [], [0.0]
+    last = drive[ros.START_NS][2]
     domain = Domain()
     with NodeProcess(domain, tmp_path / 'log') as node, ros.Partner(domain) as partner:
         partner.wait_for_node(node.alive)
@@ -37,11 +40,14 @@ def test_rounds_without_growth_or_loss(tmp_path):
             values = partner.outcome(ros.cloud(points, labels, stamp), 60.0)[2]
             assert int(values['received']) == index
             seconds.append(float(values['seconds']))
+            way_m.append(way_m[-1] + np.linalg.norm(pose[:3, 3] - last[:3, 3]))
+            last = pose
             if values['state'] != 'failed':
                 partner.spin_until(lambda: partner.odometry)
                 message, = partner.odometry
                 assert stamp_ns_of(message.header) == stamp
                 errors_m.append(ros.difference(matrix_of(message.pose.pose), origin @ pose)[0])
+                assert errors_m[-1] < 0.5 + DRIFT * way_m[-1]
             partner.forget()
             if index % (SCANS // SAMPLES) == 0:
                 samples.append(state(node))
@@ -50,11 +56,10 @@ def test_rounds_without_growth_or_loss(tmp_path):
                     index, *samples[-1], p95_ms), flush=True)
         assert node.stop() == 0
     domain.close()
-    print(f'{SCANS} scans, worst {max(errors_m):.2f} m off; {values}')
+    print(f'{SCANS} scans, {way_m[-1]:.0f} m, worst {max(errors_m):.2f} m off; {values}')
     assert int(values['processed']) == len(errors_m)
     assert int(values['processed']) + int(values['failed']) == SCANS
     assert int(values['failed']) <= SCANS // 100
-    assert max(errors_m) < 1.0
     settled = samples[SAMPLES // 4]
     for memory_mb, *others in samples[SAMPLES // 4:]:
         assert others == list(settled[1:])

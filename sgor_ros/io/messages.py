@@ -112,17 +112,18 @@ def odometry(types: Types, tracked: TrackedScan, odom_frame: str, sensor_frame: 
                        tracked.covariance, tracked.twist, tracked.twist_covariance)
 
 
-def relative_pose(types: Types, tracked: TrackedScan, sensor_frame: str) -> Any:
+def relative_pose(types: Types, tracked: TrackedScan, sensor_frame: str,
+                  reference_frame: str = '') -> Any:
     """Return a nav_msgs/msg/Odometry of the step from a scan to its reference: a graph's edge.
 
     Both frames carry the stamps of their scans: ``lidar@100200000000`` is where `sensor_frame`
     was then. The pose is that of the scan (child) in the reference, its covariance that of this
-    step alone.
+    step alone. `reference_frame` is that of the reference where it was another.
     """
     T_reference_sensor = tracked.T_reference_sensor
     assert T_reference_sensor is not None, 'only scans with a step are relative to something'
     return odometry_of(types, T_reference_sensor, tracked.stamp_ns,
-                       f'{sensor_frame}@{tracked.reference_stamp_ns}',
+                       f'{reference_frame or sensor_frame}@{tracked.reference_stamp_ns}',
                        f'{sensor_frame}@{tracked.stamp_ns}', tracked.reference_covariance)
 
 

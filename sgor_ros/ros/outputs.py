@@ -16,6 +16,7 @@ from .types import ros_type
 
 # a pose graph wants every edge
 RELATIVE_DEPTH = 100
+REMEMBERED = 1000
 
 
 class Outputs:
@@ -35,13 +36,20 @@ class Outputs:
         elif config.base_frame:
             self._extrinsic = base.by_tf2(node, config.base_frame)
         self.odom_frame = OdomFrame()
+        self._frames: dict[int, str] = {}    # of the scans that others may be registered to
 
     def publish(self, tracked: TrackedScan, sensor_frame: str) -> str:
         """Send what there is of a scan; return why it has no pose although it was registered."""
         trouble = ''
         if tracked.success:
             if tracked.T_reference_sensor is not None:
-                self._relative.publish(messages.relative_pose(ros_type, tracked, sensor_frame))
+                self._relative.publish(messages.relative_pose(
+                    ros_type, tracked, sensor_frame,
+                    self._frames.get(tracked.reference_stamp_ns or 0, sensor_frame)))
+            if tracked.keyframe:
+                # more than the tracker can keep
+                self._frames = dict(list(self._frames.items())[-REMEMBERED:])
+                self._frames[tracked.stamp_ns] = sensor_frame
             trouble = self._publish_pose(tracked, sensor_frame)
         if not trouble and self._markers.get_subscription_count():
             self._markers.publish(messages.correspondence_markers(
