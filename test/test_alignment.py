@@ -9,6 +9,7 @@ from sgor_ros import SgorConfig
 from sgor_ros.core import covariance
 from sgor_ros.core.alignment import align
 from sgor_ros.core.alignment import surface
+from sgor_ros.core.covariance import repeating
 from sgor_ros.core.covariance import scattered
 from sgor_ros.core.covariance import systematic
 from sgor_ros.core.scan.voxels import voxel_grid
@@ -117,14 +118,25 @@ def test_clouds_without_overlap_end_without_a_covariance(clouds):
 
 
 def test_what_only_scattered_things_hold_is_wider():
-    """Sigmas of 1 and 2 mm stay, of 15 mm grow four and a half times; turns as seen far away."""
+    """Sigmas of 1 mm stay, of 15 mm grow six times; turns as seen far away."""
     sigma = np.array([0.001, 0.015, 0.002, 0.001 / 20, 0.015 / 20, 0.002 / 20])
     rng = np.random.default_rng(0)
     turn = np.kron(np.eye(2), Rotation.random(rng=rng).as_matrix())
     wider = turn.T @ scattered(turn @ np.diag(sigma**2) @ turn.T, 20.0, 0.5) @ turn
-    np.testing.assert_allclose(np.sqrt(np.diag(wider)) / sigma, [1, 4.5, 1.2, 1, 4.5, 1.2],
+    np.testing.assert_allclose(np.sqrt(np.diag(wider)) / sigma, [1, 6.4, 1.4, 1, 6.4, 1.4],
                                atol=0.1)
     np.testing.assert_allclose(wider, np.diag(np.diag(wider)), atol=1e-9)
+
+
+def test_what_scattered_things_add_errs_alike_in_part():
+    """A quarter of the variance that they add; what surfaces hold repeats as it did."""
+    root = systematic(motion(0.3, 0, 0, 0), middle_range=20.0, edge=0.5)
+    random = np.diag([1e-6] * 3 + [1e-9] * 3)
+    both = repeating(root, random, random)
+    np.testing.assert_allclose(both, root, atol=1e-9)
+    both = repeating(root, random, random + np.diag([0, 4e-4, 0, 0, 0, 0]))
+    np.testing.assert_allclose(both @ both.T - root @ root.T, np.diag([0, 1e-4, 0, 0, 0, 0]),
+                               atol=1e-9)
 
 
 def test_systematic_errors_grow_with_the_motion_up_to_an_edge_of_the_grid():

@@ -1,4 +1,6 @@
 """What the motion so far makes of registrations that cannot stand alone: made by hand."""
+from dataclasses import replace
+
 from conftest import errors
 from conftest import relative
 import numpy as np
@@ -91,6 +93,20 @@ def test_lamps_from_the_first_step_on(driving):
     ([pose(3.2, yaw=np.pi), pose(9.2)], 'none of 2 placements would fit')])
 def test_two_or_none_that_fit_are_no_pose(driving, placements, words):
     assert words in choose(registration(*placements), *driving, CONFIG)
+
+
+def test_ambiguous_and_sliding_measures_nothing_along_the_slide(driving):
+    """The best placement slides as its rivals do: scan after scan, no doubt is taken away."""
+    motion, stamp_ns = driving
+    wide = np.diag([11.0**2, *np.diag(COVARIANCE)[1:]])
+    found = registration(pose(2.0, 0.02), pose(3.0, yaw=np.pi), degenerate=ALONG_X,
+                         covariance=wide)
+    for _ in range(20):
+        step = choose(replace(found, degenerate=np.empty((0, 6))), motion, stamp_ns, CONFIG)
+        predicted = motion.predict(stamp_ns, CONFIG)
+        assert step.covariance[0, 0] == pytest.approx(predicted.covariance[0, 0], rel=1e-6)
+        motion, stamp_ns = step.fused, stamp_ns + PERIOD_NS
+    assert np.sqrt(step.covariance[0, 0]) > 1.0
 
 
 def test_after_a_while_without_a_pose_more_would_fit(driving):

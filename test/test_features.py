@@ -9,6 +9,7 @@ from sgor_ros.core.scan.descriptors import normals
 from sgor_ros.core.scan.descriptors import regional_labels
 from sgor_ros.core.scan.neighbours import radius_neighbours
 from sgor_ros.core.scan.voxels import one_point_voxels
+from sgor_ros.core.scan.voxels import shift_of
 from sgor_ros.core.scan.voxels import voxel_grid
 
 
@@ -32,6 +33,18 @@ def test_voxels_by_hand():
     np.testing.assert_allclose(grid.points, [[0.2, 0.2, 0.1], [-0.1, 0, 0]], atol=1e-6)
     assert list(grid.labels) == [7, 2]
     assert list(grid.votes.sum(axis=1)) == [3, 1]
+
+
+def test_a_grid_that_is_shifted():
+    """By a quarter of a voxel, 0.45 falls among what is beyond 0.5; where depends on the scan."""
+    points = np.array([[0.1, 0.1, 0.1], [0.3, 0.1, 0.1], [0.45, 0.1, 0.1]], np.float32)
+    labels = np.zeros(3, np.uint8)
+    assert len(voxel_grid(points, labels, 0.5).points) == 1
+    grid = voxel_grid(points, labels, 0.5, 0.25)
+    np.testing.assert_allclose(grid.points[:, 0], [0.2, 0.45], atol=1e-6)
+    shifts = [shift_of(points + np.float32(k)) for k in range(100)]
+    assert shifts == [shift_of(points + np.float32(k)) for k in range(100)]
+    assert 0 <= min(shifts) < 0.1 < 0.9 < max(shifts) < 1
 
 
 def test_unlabelled_points_do_not_vote():

@@ -3,6 +3,7 @@ from conftest import errors
 from conftest import relative
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
 from sgor_ros import InputError
 from sgor_ros import preprocess
@@ -31,6 +32,18 @@ def test_keypoints_stand_over_the_ground(prepared):
     np.testing.assert_allclose(features.heights, heights, atol=1e-9)
     assert (np.abs(heights) >= SgorConfig().sigma_g).all()
     assert ground.offset == pytest.approx(1.73, abs=0.1)
+
+
+def test_surfaces_have_grids_of_their_own_and_always_the_same(scans, prepared):
+    """A scan moved by nothing but its noise is cut elsewhere; the same scan is cut the same."""
+    def surface_of(points):
+        return np.array(preprocess(SemanticScan(points, scans[0].labels)).surface.cloud.points())
+
+    np.testing.assert_array_equal(surface_of(scans[0].points),
+                                  prepared[0].surface.cloud.points())
+    other = surface_of(scans[0].points + np.float32(1e-5))
+    far = cKDTree(prepared[0].surface.cloud.points()).query(other)[0]
+    assert np.median(far) > 0.02
 
 
 def test_descriptors_are_unit_rows(prepared):

@@ -7,6 +7,7 @@ import small_gicp
 
 from .config import SgorConfig
 from .covariance import noise
+from .covariance import repeating
 from .covariance import scattered
 from .covariance import systematic
 
@@ -76,6 +77,9 @@ def align(source: Surface, target: Surface, T_target_source: NDArray[np.float64]
     pairs = int(result.num_inliers)
     repeated = systematic(T, source.middle_range, config.voxel_size)
     random = noise(np.asarray(result.H), result.error, pairs, T)
-    covariance = None if random is None else scattered(
-        random, source.middle_range, config.voxel_size) + repeated @ repeated.T
-    return Alignment(T, covariance, repeated, bool(result.converged), pairs)
+    if random is None:
+        return Alignment(T, None, repeated, bool(result.converged), pairs)
+    wider = scattered(random, source.middle_range, config.voxel_size)
+    covariance = wider + repeated @ repeated.T
+    return Alignment(T, covariance, repeating(repeated, random, wider), bool(result.converged),
+                     pairs)

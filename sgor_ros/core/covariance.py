@@ -12,15 +12,18 @@ CORRELATED_PAIRS = 8
 than there are pairs."""
 HELD = 0.01
 """Directions in which the noise stays below this, in edges of the grid, are held by surfaces."""
-SCATTERED = 20
+SCATTERED = 40
 """Beyond it only scattered things hold a direction, trunks or posts, whose many points err as one:
 the variance grows by up to so many times."""
+SCATTERED_REPEATS = 0.25
+"""This share of what the variance grows by errs alike in step after step: the same trunks are seen
+from nearly the same side."""
 ALONG = 0.02
 """The grid and the rings of the beams move with the sensor and pull a motion towards what they
 repeat at. Standard deviation along the motion, in edges of the grid."""
 ACROSS = 0.002
 """The same across the motion."""
-TURN = 0.012
+TURN = 0.02
 """The same of a point at the middle range when the scan is tilted or turned."""
 LEAST_MEAN_SQUARE = 0.01
 """Of the Mahalanobis distances: a scan that is sent twice fits without noise, which says nothing
@@ -75,6 +78,21 @@ def scattered(covariance: Array, middle_range: float, edge: float) -> Array:
     values = values * (1 + SCATTERED * loose / (1 + loose))
     widened: Array = (vectors * values) @ vectors.T / np.outer(scale, scale)
     return (widened + widened.T) / 2
+
+
+def repeating(root: Array, random: Array, wider: Array) -> Array:
+    """Return the square root of what errs alike where scattered things err alike too.
+
+    Parameters
+    ----------
+    root : (6, 6) float64
+        Of `systematic`.
+    random, wider : (6, 6) float64
+        Covariance of noise, before and after `scattered`.
+    """
+    values, vectors = np.linalg.eigh(root @ root.T + SCATTERED_REPEATS * (wider - random))
+    both: Array = (vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T
+    return both
 
 
 def systematic(T_target_source: Array, middle_range: float, edge: float) -> Array:

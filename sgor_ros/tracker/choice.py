@@ -79,7 +79,7 @@ def choose(found: Registration, motion: Motion, stamp_ns: int, config: TrackerCo
     if not len(found.degenerate) and not found.alternatives:
         return found.reason
     prediction = motion.predict(stamp_ns, config)
-    best = Placement(found.T_target_source, found.covariance, found.degenerate, found.evidence)
+    best = Placement(found.T_target_source, found.covariance, _free(found), found.evidence)
     near = [refine(other) for other in found.alternatives
             if prediction.distance(other.T_target_source,
                                    _information(other, ROUGH_COVARIANCE)) < GATE]
@@ -90,6 +90,16 @@ def choose(found: Registration, motion: Motion, stamp_ns: int, config: TrackerCo
     count = 1 + len(found.alternatives)
     return (f'{found.reason}; {len(fitting) or "none"} of {count} '
             f'placement{"s" * (count > 1)} would fit the motion so far')
+
+
+def _free(found: Registration) -> Array:
+    """Return (K, 6) directions in which the best placement slides; its rivals slide with it.
+
+    Its wide covariance alone would be taken for a weak measurement, scan after scan.
+    """
+    if len(found.degenerate) or not found.alternatives:
+        return found.degenerate
+    return found.alternatives[0].degenerate
 
 
 def _fit(placement: Placement, motion: Motion, prediction: Motion, config: TrackerConfig

@@ -6,6 +6,7 @@ from numpy.typing import ArrayLike
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from ..alignment import Surface
 from ..alignment import surface
 from ..common.checks import finite_points
 from ..common.settings import InputError
@@ -87,7 +88,7 @@ def _prepare(scan: SemanticScan, asked: SgorConfig, given: Given | None,
     with clock('voxel grid'):
         scale, config = asked.scale or 1.0, asked.scaled(asked.scale or 1.0)
         points, labels, warnings = _usable(scan, convention, config)
-        cloud = voxel_grid(points, labels, config.voxel_size, shift_of(points))
+        cloud = voxel_grid(points, labels, config.voxel_size)
         if asked.scale == 0:
             even = cloud if config.voxel_size == STREET_VOXEL else voxel_grid(
                 points, labels, STREET_VOXEL)
@@ -95,13 +96,12 @@ def _prepare(scan: SemanticScan, asked: SgorConfig, given: Given | None,
             if scale != 1:
                 config = asked.scaled(scale)
                 points, labels, warnings = _usable(scan, convention, config)
-                cloud = voxel_grid(points, labels, config.voxel_size, shift_of(points))
+                cloud = voxel_grid(points, labels, config.voxel_size)
         if len(cloud.points) > config.max_voxels:
             warnings.append(f'{len(cloud.points)} voxels thinned to {config.max_voxels}')
             cloud = cloud[thin(len(cloud.points), config.max_voxels)]
     with clock('surface'):
-        fixed = config.moving_vote | ~np.isin(cloud.labels, list(convention.movable))
-        local = surface(cloud.points[fixed], config.threads) if config.local_refinement else None
+        local = _fixed_surface(points, labels, convention, config)
     with clock('ground'):
         ground = segment_ground(cloud, convention.ground, config)
         if ground is not None and config.correspondence_preprocessing:
@@ -129,6 +129,18 @@ def _prepare(scan: SemanticScan, asked: SgorConfig, given: Given | None,
                      config.evidence_reach)
     return PreparedScan(scan, asked, scale, features, ground, sight, local, tuple(warnings),
                         clock.seconds, given)
+
+
+def _fixed_surface(points: NDArray[np.float32], labels: NDArray[np.uint8],
+                   convention: LabelConvention, config: SgorConfig) -> Surface | None:
+    """Return the surface of all that stands still, on a grid that no other scan has."""
+    if not config.local_refinement:
+        return None
+    cloud = voxel_grid(points, labels, config.voxel_size, shift_of(points))
+    if len(cloud.points) > config.max_voxels:
+        cloud = cloud[thin(len(cloud.points), config.max_voxels)]
+    fixed = config.moving_vote | ~np.isin(cloud.labels, list(convention.movable))
+    return surface(cloud.points[fixed], config.threads)
 
 
 def _usable(scan: SemanticScan, convention: LabelConvention, config: SgorConfig
