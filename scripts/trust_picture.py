@@ -17,6 +17,7 @@ from sgor_ros import preprocess
 from sgor_ros import register
 from sgor_ros import SemanticScan
 from sgor_ros.core.common import se3
+from sgor_ros.core.trust.correlation import correlated
 from sgor_ros.core.trust.degeneracy import pushed
 from sgor_ros.core.trust.evidence import AGREE
 from sgor_ros.core.trust.evidence import CONTRADICT
@@ -24,7 +25,6 @@ from sgor_ros.core.trust.evidence import evidence_of
 from sgor_ros.core.trust.evidence import spread
 from sgor_ros.core.trust.evidence import testify
 from sgor_ros.core.trust.icp import icp
-from sgor_ros.core.trust.rivals import correlated
 from sgor_ros.world import Lidar
 from sgor_ros.world import scenes
 

@@ -10,6 +10,9 @@ from scipy.spatial.transform import Rotation
 from sgor_ros import register
 from sgor_ros import SemanticScan
 from sgor_ros.core.scan.features import Features
+from sgor_ros.core.trust.comparison import differ
+from sgor_ros.core.trust.comparison import ruled_out
+from sgor_ros.core.trust.correlation import correlated
 from sgor_ros.core.trust.degeneracy import in_words
 from sgor_ros.core.trust.degeneracy import inflate
 from sgor_ros.core.trust.degeneracy import information
@@ -19,9 +22,6 @@ from sgor_ros.core.trust.degeneracy import weak_directions
 from sgor_ros.core.trust.degeneracy import without_slides
 from sgor_ros.core.trust.icp import icp
 from sgor_ros.core.trust.rivals import contest
-from sgor_ros.core.trust.rivals import correlated
-from sgor_ros.core.trust.rivals import differ
-from sgor_ros.core.trust.rivals import ruled_out
 from sgor_ros.core.trust.view import view
 from sgor_ros.world import Lidar
 from sgor_ros.world import scenes
@@ -173,6 +173,14 @@ def test_the_better_rival_wins(pillars):
     found = contest(pillars, pillars, moved(4.0), np.array([np.eye(4)]), 30.0)
     offset = found.T_target_source[0, 3]
     assert abs(offset - 8 * round(offset / 8)) < 0.2
+
+
+@pytest.mark.parametrize('start', [moved(0, 3.0), moved(0, 0, 30.0), moved(500)])
+def test_an_answer_that_nothing_speaks_for_is_no_error(bare, start):
+    """Beside the walls, above them, far away: there is nothing to compare with."""
+    found = contest(bare, bare, start, np.empty((0, 4, 4)), 30.0)
+    assert found.T_target_source.shape == (4, 4)
+    assert found.rivals.shape[1:] == (4, 4)
 
 
 def test_slides_move_and_come_back():

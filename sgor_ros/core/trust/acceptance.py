@@ -13,6 +13,8 @@ from ..result import Placement
 from ..result import Registration
 from ..solver.refinement import distances
 from ..solver.verification import near_counts
+from .comparison import differ
+from .comparison import ruled_out
 from .degeneracy import directions
 from .degeneracy import in_words
 from .degeneracy import inflate
@@ -20,9 +22,7 @@ from .evidence import evidence_of
 from .evidence import testify
 from .rivals import Contest
 from .rivals import contest
-from .rivals import differ
 from .rivals import MANY
-from .rivals import ruled_out
 from .view import View
 
 

@@ -96,6 +96,8 @@ def pushed(T_target_source: NDArray[np.float64], twists: NDArray[np.float64]
            ) -> NDArray[np.float64]:
     """Move a placement by (K, 6) twists about its own origin, (K, 4, 4)."""
     moved = np.tile(T_target_source, (len(twists), 1, 1))
+    if not len(twists):
+        return moved    # of which older versions of scipy make no rotations
     moved[:, :3, :3] = Rotation.from_rotvec(twists[:, 3:]).as_matrix() @ T_target_source[:3, :3]
     moved[:, :3, 3] += twists[:, :3]
     return moved
