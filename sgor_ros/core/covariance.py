@@ -23,7 +23,7 @@ ALONG = 0.02
 repeat at. Standard deviation along the motion, in edges of the grid."""
 ACROSS = 0.002
 """The same across the motion."""
-TURN = 0.02
+TURN = 0.024
 """The same of a point at the middle range when the scan is tilted or turned."""
 LEAST_MEAN_SQUARE = 0.01
 """Of the Mahalanobis distances: a scan that is sent twice fits without noise, which says nothing
