@@ -32,6 +32,7 @@ def test_result_on_screen_in_json_and_as_picture(pair, tmp_path, capsys):
     np.testing.assert_allclose(np.array([row.split() for row in printed[1:5]], float),
                                result['T_target_source'], atol=1e-8)
     assert result['success']
+    assert result['degenerate'] == result['alternatives'] == []
     assert 10 <= result['inliers'] <= result['correspondences']
     assert (tmp_path / 'r.png').read_bytes().startswith(b'\x89PNG')
 

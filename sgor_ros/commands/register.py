@@ -99,9 +99,12 @@ def _as_dict(result: Registration, arguments: Namespace) -> dict[str, Any]:
     return {
         'source': str(arguments.source), 'target': str(arguments.target),
         'success': result.success, 'reason': result.reason, 'confidence': result.confidence,
-        # a refused candidate is nothing to build on
-        'T_target_source': T.tolist() if result.success and T is not None else None,
+        # a refused candidate is nothing to build on; one of several, or one that slides, may be
+        'T_target_source': T.tolist() if T is not None and (
+            result.success or len(result.degenerate) or result.alternatives) else None,
         'covariance': None if covariance is None else covariance.tolist(),
+        'degenerate': result.degenerate.tolist(),
+        'alternatives': [other.T_target_source.tolist() for other in result.alternatives],
         'correspondences': len(result.inliers), 'inliers': int(result.inliers.sum()),
         'evidence': result.evidence, 'warnings': list(result.warnings),
         'timings_s': result.timings}

@@ -55,8 +55,9 @@ class Registration:
         drive, so that it adds up instead of averaging out.
     degenerate : (K, 6) float64
         Unit directions (x, y, z, rotation about x, y, z) in the target frame along which the
-        clouds slide on each other (degeneracy); empty where all six are held. Never with
-        `success`: the other directions are good, the transformation as a whole is not.
+        clouds slide on each other (degeneracy). Never with `success`: the other directions are
+        good, the transformation as a whole is not. Empty where all six are held, and where the
+        result is ambiguous: then those of each alternative tell.
     alternatives : tuple of Placement
         The other placements that the clouds cannot rule out (perceptual aliasing), best first.
         Never with `success`.
