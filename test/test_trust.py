@@ -141,7 +141,8 @@ def test_what_a_registration_says_of_itself_reaches_its_row(corridors):
         covariance = np.diag([100.0, 0.01, 0.01, 1.0, 1.0, 1.0])
         other = Placement(np.eye(4), covariance, np.empty((0, 6)), {})
         result = Registration(False, 'slides', np.eye(4), np.empty((0, 3)), np.empty((0, 3)),
-                              np.empty(0, bool), 0.7, covariance, free, (other, other))
+                              np.empty(0, bool), 0.7, covariance, degenerate=free,
+                              alternatives=(other, other))
         return Answer(np.eye(4), 0.1, False, 0.0, 0.1, result)
 
     found, = run_pairs([pair], [Method('m', answer)], seed=0)

@@ -131,7 +131,7 @@ class SgorConfig(Settings):
         30.0, 'Other placements that explain the scans are looked for so far from the answer; 0: '
         'not at all (beyond the paper)', 'm', minimum=0.0, maximum=500.0)
     min_confidence: float = setting(
-        0.8, 'Results below this confidence are failures; 0: accept all',
+        0.85, 'Results below this confidence are failures; 0: accept all',
         minimum=0.0, maximum=1.0)
 
     threads: int = setting(2, 'Processor cores to use', minimum=1, maximum=64)

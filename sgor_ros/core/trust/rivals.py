@@ -156,8 +156,9 @@ def _measured(source: View, target: View, T: NDArray[np.float64], outcomes: NDAr
             # nor does it leave the ground, of which the keypoints are none
             line -= (line @ target.axes[2]) * target.axes[2]
         twist = np.concatenate((line / np.linalg.norm(line), np.zeros(3)))
-    # with no end in sight, anywhere within the radius is as likely
-    return Slide(twist, radius / np.sqrt(3), lever)
+    # with no end in sight the source may be anywhere around the target, wherever it is laid now
+    offset = float(T[:3, 3] @ twist[:3])
+    return Slide(twist, float(np.hypot(radius / np.sqrt(3), offset)), lever)
 
 
 def _remaining(placements: NDArray[np.float64], outcomes: NDArray[np.int8], best: int,

@@ -183,18 +183,15 @@ def _range_image(points):  # type: ignore[no-untyped-def]
     return nearest
 
 
-@numba.njit(cache=True, nogil=True)
-def _shortest_around(nearest):  # type: ignore[no-untyped-def]
+def _shortest_around(nearest: NDArray[np.float32]) -> NDArray[np.float32]:
     """Take the shortest of the cell and its 8 neighbours where something was measured.
 
     At the edge of a thing the sensor has looked past it, not through it.
     """
-    around = np.full_like(nearest, np.inf)
-    for a in range(AZIMUTHS):
-        for e in range(ELEVATIONS):
-            if nearest[a, e] < np.inf:
-                for da in range(-1, 2):
-                    for de in range(max(-1, -e), min(2, ELEVATIONS - e)):
-                        around[a, e] = min(around[a, e],
-                                           nearest[(a + da) % AZIMUTHS, e + de])
-    return around
+    around = np.minimum(nearest, np.minimum(np.roll(nearest, 1, axis=0),
+                                            np.roll(nearest, -1, axis=0)))
+    shortest = around.copy()
+    np.minimum(shortest[:, 1:], around[:, :-1], out=shortest[:, 1:])
+    np.minimum(shortest[:, :-1], around[:, 1:], out=shortest[:, :-1])
+    shortest[nearest == np.inf] = np.inf
+    return shortest
