@@ -20,8 +20,10 @@ from .degeneracy import in_words
 from .degeneracy import inflate
 from .evidence import evidence_of
 from .evidence import testify
+from .icp import icp
 from .rivals import Contest
 from .rivals import contest
+from .rivals import LATE
 from .rivals import MANY
 from .view import View
 
@@ -60,7 +62,13 @@ def compete(result: Registration, source: View, target: View, config: SgorConfig
         nobody = np.empty((0, 4, 4))
         found = Contest(T[0], testify(source, target, T, MANY)[0], nobody,
                         testify(source, target, nobody, MANY))
-    return believe(_at(result, found.T_target_source, config), found.outcomes, config), found
+    believed = believe(_at(result, found.T_target_source, config), found.outcomes, config)
+    if believed.success or config.rival_radius == 0:
+        return believed, found
+    # not refused for a fit that was only on its way
+    T = icp(source, target, found.T_target_source[None], LATE, LATE)
+    found = replace(found, T_target_source=T[0], outcomes=testify(source, target, T, MANY)[0])
+    return believe(_at(result, T[0], config), found.outcomes, config), found
 
 
 def believe(result: Registration, outcomes: NDArray[np.int8], config: SgorConfig) -> Registration:
