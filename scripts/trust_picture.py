@@ -17,12 +17,12 @@ from sgor_ros import preprocess
 from sgor_ros import register
 from sgor_ros import SemanticScan
 from sgor_ros.core.common import se3
+from sgor_ros.core.scan.voxels import thin
 from sgor_ros.core.trust.correlation import correlated
 from sgor_ros.core.trust.degeneracy import pushed
 from sgor_ros.core.trust.evidence import AGREE
 from sgor_ros.core.trust.evidence import CONTRADICT
 from sgor_ros.core.trust.evidence import evidence_of
-from sgor_ros.core.trust.evidence import spread
 from sgor_ros.core.trust.evidence import testify
 from sgor_ros.core.trust.icp import icp
 from sgor_ros.world import Lidar
@@ -140,7 +140,7 @@ def draw(axes: Any, example: Example, T: Array, width: float) -> None:
         axes.scatter(*placed[:, :2].T, s=1.6, color=colour, alpha=0.55, linewidths=0,
                      rasterized=True)
     outcomes = testify(source.view, target.view, T[None], ASKED)[0]
-    asked = [se3.transform(pose, scan.view.points[spread(len(scan.view.points), ASKED)])
+    asked = [se3.transform(pose, scan.view.points[thin(len(scan.view.points), ASKED)])
              for scan, pose in ((source, W @ T), (target, W))]
     against = np.vstack(asked)[outcomes == CONTRADICT]
     axes.plot(*against[:, :2].T, 'o', color=RED, ms=3.2, mew=0)

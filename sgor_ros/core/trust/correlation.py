@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common import se3
-from .evidence import spread
+from ..scan.voxels import thin
 from .view import kinds_of
 from .view import map_bits
 from .view import sectors_of
@@ -25,7 +25,7 @@ def correlated(source: View, target: View, T_target_source: NDArray[np.float64],
     radius : float
         Farthest shift of the source's sensor along either axis of the ground plane, metres.
     """
-    rows = spread(len(source.points), SWEEP_SAMPLE)
+    rows = thin(len(source.points), SWEEP_SAMPLE)
     placed = se3.transform(T_target_source, source.points[rows]) @ target.axes.T
     sensor = target.axes @ T_target_source[:3, 3]
     facing = source.normals[rows] @ (target.axes @ T_target_source[:3, :3]).T

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ..common import se3
 from ..scan.labels import UNLABELLED
+from ..scan.voxels import thin
 from .view import direction
 from .view import slot_of
 from .view import View
@@ -99,7 +100,7 @@ def rank(source: View, target: View, T_target_source: NDArray[np.float64]) -> ND
 
 def _ask(source: View, target: View, T: NDArray[np.float64], sample: int, *, rough: bool = False
          ) -> NDArray[np.int8]:
-    rows = spread(len(source.points), sample)
+    rows = thin(len(source.points), sample)
     outcomes = np.zeros((len(T), len(rows)), np.int8)
     # roughly, whatever is in the cells around is a partner
     reach, near, margin = ((target.cell, target.cell, target.cell) if rough else
@@ -108,13 +109,6 @@ def _ask(source: View, target: View, T: NDArray[np.float64], sample: int, *, rou
               target.labels, target.cell, target.slots, target.chain, target.nearest, reach,
               near * near, margin, outcomes)
     return outcomes
-
-
-def spread(count: int, most: int) -> NDArray[np.intp]:
-    """Return at most `most` of the indices 0 to count - 1, evenly spread."""
-    if count <= most:
-        return np.arange(count)
-    return np.linspace(0, count - 1, most).astype(np.intp)
 
 
 @numba.njit(cache=True, nogil=True, parallel=True)

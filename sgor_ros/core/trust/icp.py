@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common import se3
+from ..scan.voxels import thin
 from .evidence import alike
 from .evidence import cells_around
 from .evidence import gap
 from .evidence import ON_SURFACE
-from .evidence import spread
 from .evidence import TANGENTIAL
 from .view import slot_of
 from .view import View
@@ -41,7 +41,7 @@ def icp(source: View, target: View, T_target_source: NDArray[np.float64], wide: 
     -------
     (H, 4, 4) float64
     """
-    rows = spread(len(source.points), sample)
+    rows = thin(len(source.points), sample)
     T = np.array(T_target_source)
     _icp(source.points[rows], source.labels[rows], T, target.points, target.normals,
          target.labels, target.cell, target.slots, target.chain, target.reach, wide, narrow)
@@ -51,7 +51,7 @@ def icp(source: View, target: View, T_target_source: NDArray[np.float64], wide: 
 def partners(source: View, target: View, T_target_source: NDArray[np.float64], sample: int
              ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Return rows of source keypoints and of the target keypoints that they lie on, (P,) each."""
-    rows = spread(len(source.points), sample)
+    rows = thin(len(source.points), sample)
     found = np.empty(len(rows), np.int64)
     _partners(se3.transform(T_target_source, source.points[rows]), source.labels[rows],
               target.points, target.normals, target.labels, target.cell, target.slots,
