@@ -63,7 +63,8 @@ def shared(kernel: Callable[..., None], count: int, *arguments: Any) -> None:
     """
     threads = min(getattr(_allowed, 'count', _CORES), count)
     if threads <= 1:
-        kernel(0, count, *arguments)
+        if count:
+            kernel(0, count, *arguments)
         return
     pieces = min(PIECES * threads, count)
     following = counter()
@@ -75,8 +76,10 @@ def shared(kernel: Callable[..., None], count: int, *arguments: Any) -> None:
     if not _pool:
         _pool.append(ThreadPoolExecutor(_CORES, 'sgor'))
     others = [_pool[0].submit(take) for _ in range(threads - 1)]
-    take()
-    for other in others:
-        # not begun yet, where others use the pool: nothing is left for it
-        if not other.cancel():
-            other.result()
+    try:
+        take()
+    finally:
+        for other in others:
+            # not begun yet, where others use the pool: nothing is left for it
+            if not other.cancel():
+                other.result()
