@@ -79,11 +79,11 @@ def test_without_semantics_labels_do_not_count():
     assert len(plain) == 300
     mixed = target.context.copy()
     mixed[:, 3:] = mixed[::-1, 3:]
-    other = replace(target, regional=target.regional[::-1].copy(), context=mixed)
+    other = replace(target, regional=target.regional[::-1].copy(), surrounded=mixed)
     np.testing.assert_array_equal(match(source, other, config).target, plain)
     mixed = target.context.copy()
     mixed[:, :3] = mixed[::-1, :3]
-    other = replace(target, context=mixed)
+    other = replace(target, surrounded=mixed)
     assert (match(source, other, config).target != plain).any(axis=1).mean() > 0.5
 
 

@@ -112,8 +112,14 @@ def _attempts(config: SgorConfig, *, labelled: bool, level: bool) -> Iterator[Sg
 def _globally(source: PreparedScan, target: PreparedScan, config: SgorConfig,
               clock: Stopwatch) -> tuple[Registration, Contest | None]:
     """Match, solve, and let the clouds choose among the answer and its rivals."""
+    p, q = source.features, target.features
+    with clock('descriptors'):
+        # made by the first attempt that needs them, and kept
+        _ = p.descriptors, q.descriptors
+    if config.context_weight > 0:
+        with clock('context'):
+            _ = p.context, q.context
     with clock('matching'):
-        p, q = source.features, target.features
         if config.correspondence_preprocessing and config.semantics != 'none':
             p, q = overlap_region(p, q)
         correspondences = match(p, q, config)

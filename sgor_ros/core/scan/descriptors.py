@@ -22,14 +22,26 @@ DESCRIPTOR_SIZE = 3 * BINS
 def regional_labels(cloud: VoxelCloud, neighbours: Neighbours, radius: float) -> NDArray[np.uint8]:
     """Vote over the raw points within `radius` metres: S(p) of Sec. III-C, (V,)."""
     votes = np.zeros_like(cloud.votes)
+    if not votes.size:
+        return winning_labels(votes, cloud.classes)
     shared(_sum_votes, len(votes), cloud.votes, neighbours.start, neighbours.index,
            neighbours.squared, radius * radius, votes)
     return winning_labels(votes, cloud.classes)
 
 
-def normals(points: NDArray[np.float64], neighbours: Neighbours,
-            radius: float) -> NDArray[np.float64]:
+def normals(points: NDArray[np.float64], neighbours: Neighbours, radius: float,
+            counts: NDArray[np.bool_] | None = None) -> NDArray[np.float64]:
     """Estimate unit normals from the neighbours within `radius` metres, towards the sensor.
+
+    Parameters
+    ----------
+    points : (V, 3) float64
+    neighbours : Neighbours
+        Of `points`, at least as far as `radius`.
+    radius : float
+        Metres.
+    counts : (V,) bool, optional
+        Which neighbours count; default: all.
 
     Returns
     -------
@@ -37,8 +49,9 @@ def normals(points: NDArray[np.float64], neighbours: Neighbours,
         ``(0, 0, 1)`` turned to the sensor where fewer than three points lie within the radius.
     """
     found = np.empty((len(points), 3))
+    counts = np.ones(len(points), np.bool_) if counts is None else counts
     shared(_normals, len(points), points, neighbours.start, neighbours.index,
-           neighbours.squared, radius * radius, found)
+           neighbours.squared, radius * radius, counts, found)
     return found
 
 
@@ -84,14 +97,14 @@ def _sum_votes(first, last, own, start, index, squared, limit,  # type: ignore[n
 
 @numba.njit(cache=True, nogil=True)
 def _normals(first, last, points, start, index, squared, limit,  # type: ignore[no-untyped-def]
-             found):
+             counts, found):
     for i in range(np.uint64(first), np.uint64(last)):
         n = 0
         # sums of differences to the point itself: no cancellation far from the origin
         sx = sy = sz = sxx = sxy = sxz = syy = syz = szz = 0.0
         for k in range(start[i], start[i + 1]):
-            if squared[k] <= limit:
-                j = index[k]
+            j = index[k]
+            if squared[k] <= limit and counts[j]:
                 x = points[j, 0] - points[i, 0]
                 y = points[j, 1] - points[i, 1]
                 z = points[j, 2] - points[i, 2]

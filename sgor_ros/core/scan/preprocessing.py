@@ -1,5 +1,6 @@
 """`preprocess`: everything of one scan that does not depend on the other (Sec. III-B)."""
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -106,13 +107,18 @@ def _prepare(scan: SemanticScan, asked: SgorConfig, given: Given | None,
         ground = segment_ground(cloud, convention.ground, config)
         if ground is not None and config.correspondence_preprocessing:
             cloud = cloud[~ground.mask]
+    with clock('neighbours'):
+        radius = max(config.vote_radius, config.normal_radius)
+        neighbours = radius_neighbours(cloud.points, radius)
     with clock('votes'):
-        neighbours = radius_neighbours(cloud.points, config.vote_radius)
         regional = regional_labels(cloud, neighbours, config.vote_radius)
         keep = ~np.isin(regional, _unmatched_classes(convention, config))
-        cloud, regional = cloud[keep], regional[keep]
+    with clock('normals'):
+        directions = normals(cloud.points, neighbours, config.normal_radius, keep)[keep]
+    cloud, regional = cloud[keep], regional[keep]
     if given is None:
-        features, directions = _describe(cloud, regional, config, clock)
+        features = Features(cloud.points, cloud.labels, regional, partial(
+            _described, cloud.points, directions, config.descriptor_radius))
     else:
         features = _given(*given, cloud, regional, config)
         directions = normals(features.points, radius_neighbours(
@@ -120,8 +126,7 @@ def _prepare(scan: SemanticScan, asked: SgorConfig, given: Given | None,
     if ground is None:
         warnings.append('no ground plane found: no ground check')
     else:
-        with clock('context'):
-            features = _over_ground(features, ground, convention, config)
+        features = _over_ground(features, ground, convention, config)
         if ground.source == 'geometry':
             warnings.append('no ground labels: ground plane found by geometry')
     with clock('view'):
@@ -183,16 +188,9 @@ def _unmatched_classes(convention: LabelConvention, config: SgorConfig) -> list[
     return sorted(ground if config.moving_vote else ground | convention.movable)
 
 
-def _describe(cloud: VoxelCloud, regional: NDArray[np.uint8], config: SgorConfig,
-              clock: Stopwatch) -> tuple[Features, NDArray[np.float64]]:
-    """Return the voxels as keypoints, and their normals."""
-    with clock('neighbours'):
-        neighbours = radius_neighbours(cloud.points, config.descriptor_radius)
-    with clock('normals'):
-        directions = normals(cloud.points, neighbours, config.normal_radius)
-    with clock('descriptors'):
-        described = fpfh(cloud.points, directions, neighbours)
-    return Features(cloud.points, cloud.labels, regional, described), directions
+def _described(points: NDArray[np.float64], directions: NDArray[np.float64], radius: float
+               ) -> NDArray[np.float32]:
+    return fpfh(points, directions, radius_neighbours(points, radius))
 
 
 def _over_ground(features: Features, ground: Ground, convention: LabelConvention,
@@ -201,8 +199,9 @@ def _over_ground(features: Features, ground: Ground, convention: LabelConvention
     heights = ground.heights(features.points)
     if config.context_weight == 0:
         return replace(features, heights=heights)
-    return replace(features, heights=heights, context=semantic_context(
-        features.points, features.regional, ground, context_classes(convention), config))
+    return replace(features, heights=heights, surrounded=partial(
+        semantic_context, features.points, features.regional, ground, context_classes(convention),
+        config))
 
 
 def _given(keypoints: ArrayLike | None, descriptors: ArrayLike | None, cloud: VoxelCloud,
