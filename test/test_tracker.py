@@ -15,7 +15,7 @@ from sgor_ros.evaluation.pairs import read_drives
 
 PERIOD_NS = 100_000_000
 MODES = ('consecutive', 'keyframe')
-FAR = {'keyframe_distance': 100.0, 'keyframe_angle': 3.0, 'keyframe_inliers': 0.0}
+FAR = {'keyframe_distance': 100.0, 'keyframe_angle': 3.0, 'keyframe_overlap': 0.0}
 
 
 @pytest.fixture(scope='module')
@@ -109,14 +109,15 @@ def test_a_keyframe_by_angle(scans):
     assert references(track(turned, **{**FAR, 'keyframe_angle': 1.0})) == [None, 0, 0]
 
 
-def test_a_keyframe_by_falling_inliers(scans):
+@pytest.mark.parametrize('predict_first', [True, False])
+def test_a_keyframe_by_falling_overlap(scans, predict_first):
     """The share is that of the first scan after the keyframe; it falls on the way."""
-    results = track(scans, **FAR)
-    counts = [r.registration.inliers.sum() for r in results[1:]]
-    assert counts[0] > counts[1] > counts[2]
-    between = float((counts[1] + counts[2]) / 2 / counts[0])
-    assert [r.keyframe for r in track(scans, **{**FAR, 'keyframe_inliers': between})] == [
-        True, False, False, True]
+    results = track(scans, **FAR, predict_first=predict_first)
+    overlap = [r.registration.evidence['agree'] for r in results[1:]]
+    assert overlap[0] > overlap[1] > overlap[2]
+    between = (overlap[1] + overlap[2]) / 2 / overlap[0]
+    again = track(scans, **{**FAR, 'keyframe_overlap': between}, predict_first=predict_first)
+    assert [r.keyframe for r in again] == [True, False, False, True]
     assert not any(r.keyframe for r in results[1:])
 
 

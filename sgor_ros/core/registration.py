@@ -66,17 +66,24 @@ def _register(source: SemanticScan | PreparedScan, target: SemanticScan | Prepar
             source, target = (at_scale(scan, max(source.scale, target.scale))
                               for scan in (source, target))
     config = config.scaled(source.scale)
-    labelled = (source.features.labelled_share > 0, target.features.labelled_share > 0)
+    labelled = all(scan.features.labelled_share > 0 for scan in (source, target))
     doubtful = source.scale < 1 and any(
         scan.ground is None or scan.ground.source == 'geometry' for scan in (source, target))
-    for attempt in _attempts(config, labelled=all(labelled), level=not doubtful):
+    for attempt in _attempts(config, labelled=labelled, level=not doubtful):
         result, contest = _globally(source, target, attempt, clock)
         if result.success:
             break
     if result.success and contest is not None:
-        result = _locally(result, contest, source, target, config, clock)
+        result = locally(result, contest, source, target, config, clock)
+    return with_grounds(result, source, target)
+
+
+def with_grounds(result: Registration, source: PreparedScan, target: PreparedScan
+                 ) -> Registration:
+    """Add what is known of the two scans: their grounds, and what was odd about them."""
     warnings = (*(f'source: {w}' for w in source.warnings),
                 *(f'target: {w}' for w in target.warnings))
+    labelled = (source.features.labelled_share > 0, target.features.labelled_share > 0)
     if any(labelled) and not all(labelled):
         warnings += (f'labels ignored: the {"target" if labelled[0] else "source"} has none',)
     return replace(result, source_ground=source.ground, target_ground=target.ground,
@@ -130,8 +137,8 @@ def _globally(source: PreparedScan, target: PreparedScan, config: SgorConfig,
         return compete(result, source.view, target.view, config)
 
 
-def _locally(result: Registration, contest: Contest, source: PreparedScan, target: PreparedScan,
-             config: SgorConfig, clock: Stopwatch) -> Registration:
+def locally(result: Registration, contest: Contest, source: PreparedScan, target: PreparedScan,
+            config: SgorConfig, clock: Stopwatch) -> Registration:
     """Refine on the clouds, and judge again beside the rivals (beyond the paper)."""
     assert result.T_target_source is not None
     if source.surface is not None and target.surface is not None:

@@ -92,6 +92,13 @@ def choose(found: Registration, motion: Motion, stamp_ns: int, config: TrackerCo
             f'placement{"s" * (count > 1)} would fit the motion so far')
 
 
+def is_likely(found: Registration, prediction: Motion) -> bool:
+    """Whether a registration that stands for itself lies where it was predicted."""
+    assert found.T_target_source is not None
+    return prediction.distance(found.T_target_source, _information(Placement(
+        found.T_target_source, found.covariance, found.degenerate, found.evidence))) < GATE
+
+
 def _free(found: Registration) -> Array:
     """Return (K, 6) directions in which the best placement slides; its rivals slide with it.
 

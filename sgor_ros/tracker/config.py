@@ -14,15 +14,19 @@ class TrackerConfig(Settings):
         'keyframe', 'Register to the scan before, or to the last keyframe',
         choices=('consecutive', 'keyframe'))
 
+    predict_first: bool = setting(
+        True, 'Test the motion so far on the clouds first: SGOR runs where that does not '
+        'convince, and for each new keyframe. false: SGOR registers every scan')
+
     # keyframes
     keyframe_distance: float = setting(
         5.0, 'A scan farther from its keyframe becomes the next', 'm', minimum=0.1, maximum=100.0)
     keyframe_angle: float = setting(
         math.radians(20.0), 'A scan turned by more from its keyframe becomes the next', 'rad',
         minimum=0.01, maximum=math.pi)
-    keyframe_inliers: float = setting(
-        0.4, 'Below this share of the inliers that the first scan after the keyframe had, the '
-        'scan becomes the next', minimum=0.0, maximum=1.0)
+    keyframe_overlap: float = setting(
+        0.75, 'A scan whose keypoints lie on surfaces of its keyframe less often than this share '
+        'of the first scan after it becomes the next', minimum=0.0, maximum=1.0)
     max_keyframes: int = setting(
         10, 'Keyframes to remember; where there are more, the one goes that leaves the '
         'smallest gap',

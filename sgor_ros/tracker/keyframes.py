@@ -26,8 +26,8 @@ class Keyframe:
         The track in whose frame the pose is.
     T_odom_sensor : (4, 4) float64
     covariance : PoseCovariance or None
-    first_inliers : int or None
-        Inliers of the first scan that was registered to it.
+    first_overlap : float or None
+        Share of agreeing keypoints of the first scan that was registered to it.
     """
 
     prepared: PreparedScan
@@ -35,7 +35,7 @@ class Keyframe:
     track_id: int
     T_odom_sensor: NDArray[np.float64]
     covariance: PoseCovariance | None
-    first_inliers: int | None = None
+    first_overlap: float | None = None
 
     def ready(self, config: SgorConfig) -> 'Keyframe':
         """Return it prepared with these settings: they may have changed since."""

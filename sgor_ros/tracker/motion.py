@@ -15,6 +15,8 @@ GATE = 20.06
 """Squared distance in six dimensions that 99.7 % of right placements stay below."""
 ACCELERATION_S = 1.0
 """Seconds over which an acceleration lasts."""
+NARROW_M = 0.5
+"""Root of the summed variances below which a prediction is near enough to be fitted."""
 SHORTEST_S = 0.1
 """Bounds on speed allow this much time at least: stamps jitter."""
 
@@ -57,6 +59,10 @@ class Motion:
     def twist_covariance(self) -> Array:
         """The (6, 6) covariance of the twist."""
         return self.covariance[6:, 6:]
+
+    def is_narrow(self) -> bool:
+        """Whether it says where the scan is to within what a fit to the clouds pulls in."""
+        return float(np.trace(self.pose_covariance[:3, :3])) < NARROW_M**2
 
     def seconds_to(self, stamp_ns: int) -> float:
         """Return the time from here to a stamp."""

@@ -69,6 +69,9 @@ class TrackedScan:
         Scans in a row without a pose, with this one.
     late : int
         Scans dropped so far because of their stamps.
+    confirmed : bool
+        Whether the clouds confirmed the motion that was predicted, so that SGOR did not run:
+        `registration` comes from `confirm`.
     """
 
     stamp_ns: int
@@ -90,3 +93,4 @@ class TrackedScan:
     reference_covariance: NDArray[np.float64] | None = None
     failures: int = 0
     late: int = 0
+    confirmed: bool = False

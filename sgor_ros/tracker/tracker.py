@@ -7,12 +7,14 @@ from numpy.typing import NDArray
 
 from ..core.common import se3
 from ..core.config import SgorConfig
+from ..core.confirmation import confirm
 from ..core.registration import register
 from ..core.result import Registration
 from ..core.scan.preprocessing import preprocess
 from ..core.scan.scan import PreparedScan
 from ..core.scan.scan import SemanticScan
 from .choice import choose
+from .choice import is_likely
 from .choice import refined
 from .choice import Step
 from .choice import UNKNOWN_COVARIANCE
@@ -39,6 +41,12 @@ class _Scan:
     timings: dict[str, float]
     registration: Registration | None = None
     reference: Keyframe | None = None
+    confirmed: bool = False
+
+    def spent(self, timings: dict[str, float]) -> None:
+        """Add the seconds of stages."""
+        for stage, seconds in timings.items():
+            self.timings[stage] = self.timings.get(stage, 0.0) + seconds
 
 
 class Tracker:
@@ -89,10 +97,11 @@ class Tracker:
         new = _Scan(prepared, stamp_ns, [*warnings, *prepared.warnings], dict(prepared.timings))
         if self._reference is None:
             return self._begin(new)
-        step = self._step(new, self._reference)
+        step = self._predicted_step(new) or self._step(new, self._reference)
         if isinstance(step, Step):
             # in a new track each new place is a chance to find back to an old track
-            older = self._recognise(new, 1, earlier=True) if self._is_elsewhere(step) else None
+            elsewhere = self._is_elsewhere(step.T_reference_sensor)
+            older = self._recognise(new, 1, earlier=True) if elsewhere else None
             return self._accept(new, older or step)
         other = self._recognise(new, self.tracker_config.retries)
         return self._fail(new, step) if other is None else self._accept(new, other)
@@ -103,6 +112,7 @@ class Tracker:
         self._motion = Motion.unknown(0, np.eye(4), np.zeros((6, 6)), self.tracker_config)
         self._track_id = self._tracks
         self._failures = 0
+        self._sure = False
 
     def _drop(self, stamp_ns: int) -> TrackedScan:
         self._late += 1
@@ -119,6 +129,7 @@ class Tracker:
         self._tracks += 1
         self._track_id = self._tracks
         self._failures = 0
+        self._sure = False
         origin = PoseCovariance.origin()
         self._reference = Keyframe(new.prepared, new.stamp_ns, self._track_id, np.eye(4), origin)
         self._motion = Motion.unknown(new.stamp_ns, np.eye(4), np.zeros((6, 6)),
@@ -127,12 +138,37 @@ class Tracker:
         return replace(self._result(new, State.NEW_TRACK), success=True, T_odom_sensor=np.eye(4),
                        covariance=origin.pose, keyframe=True, restarted=True)
 
+    def _predicted_step(self, new: _Scan) -> Step | None:
+        """Test the predicted motion; return a step if it convinces, and None if SGOR is to run.
+
+        That follows a scan that stood for itself, as long as no keyframe is to be made: what all
+        later scans are registered to has been found without any prediction.
+        """
+        c, motion = self.tracker_config, self._motion_before(new.stamp_ns)
+        assert self._reference is not None
+        prediction = motion.predict(new.stamp_ns, c)
+        T = prediction.T_reference_sensor
+        if not (c.predict_first and self._sure and not self._failures and prediction.is_narrow()
+                and self._stays(T)):
+            return None
+        self._reference = self._reference.ready(self.config)
+        found = confirm(new.prepared, self._reference.prepared, T, self.config)
+        new.spent(found.timings)
+        if (not found.success or found.T_target_source is None
+                or not self._stays(found.T_target_source, found)
+                or not is_likely(found, prediction)):
+            return None
+        step = Step(found.T_target_source, found.covariance, found.systematic)
+        if motion.impossible(new.stamp_ns, step.T_reference_sensor, c):
+            return None
+        new.registration, new.reference, new.confirmed = found, self._reference, True
+        return step
+
     def _step(self, new: _Scan, keyframe: Keyframe) -> Step | str:
         """Register a scan to a keyframe; return the step to it, or why there is none."""
         keyframe = keyframe.ready(self.config)
         found = register(new.prepared, keyframe.prepared, self.config)
-        for stage, seconds in found.timings.items():
-            new.timings[stage] = new.timings.get(stage, 0.0) + seconds
+        new.spent(found.timings)
         assert self._reference is not None
         if keyframe.stamp_ns == self._reference.stamp_ns:
             self._reference = keyframe
@@ -183,7 +219,9 @@ class Tracker:
         if step.note:
             new.warnings.append(step.note)
         moving = self._move(new, keyframe, step)
+        assert new.registration is not None
         self._reference, self._track_id, self._failures = keyframe, keyframe.track_id, 0
+        self._sure = new.registration.success
         T_odom_sensor = keyframe.T_odom_sensor @ T
         covariance = None
         if keyframe.covariance is not None and step.covariance is not None:
@@ -197,9 +235,13 @@ class Tracker:
             twist_covariance=(self._motion.twist_covariance
                               if moving and step.covariance is not None else None),
             T_reference_sensor=T, reference_covariance=step.covariance)
-        if not self._is_keyframe(new, step):
+        c = self.tracker_config
+        kept = self._makes_keyframe(T, new.registration)
+        if keyframe.first_overlap is None:
+            self._reference = replace(self._reference, first_overlap=_overlap(new.registration))
+        if (len(new.prepared.features.points) < c.min_keypoints
+                or (not kept and c.mode == 'keyframe')):
             return result
-        kept = self._is_elsewhere(step) or self.tracker_config.mode == 'keyframe'
         self._reference = Keyframe(new.prepared, new.stamp_ns, self._track_id, T_odom_sensor,
                                    covariance)
         self._motion = self._motion.at_new_reference()
@@ -244,28 +286,35 @@ class Tracker:
             new.stamp_ns, False, '', None, None, None, new.registration,
             None if new.reference is None else new.reference.stamp_ns, False, False,
             tuple(new.warnings), new.timings, state, self._track_id, failures=self._failures,
-            late=self._late)
+            late=self._late, confirmed=new.confirmed)
 
-    def _is_keyframe(self, new: _Scan, step: Step) -> bool:
-        """Whether the next scan is to be registered to this one."""
-        c, T = self.tracker_config, step.T_reference_sensor
+    def _makes_keyframe(self, T_reference_sensor: Array, found: Registration | None = None
+                        ) -> bool:
+        """Whether a scan that was found there is to be remembered."""
         assert self._reference is not None
-        assert new.registration is not None
-        if len(new.prepared.features.points) < c.min_keypoints:
-            return False
-        count = int(new.registration.inliers.sum())
-        if self._reference.first_inliers is None:
-            self._reference = replace(self._reference, first_inliers=count)
-        share = count / max(self._reference.first_inliers or 0, 1)
-        return (c.mode == 'consecutive' or _is_far(T, c) or share < c.keyframe_inliers)
+        c, first = self.tracker_config, self._reference.first_overlap
+        if c.mode == 'consecutive':
+            return self._is_elsewhere(T_reference_sensor)
+        return _is_far(T_reference_sensor, c) or (
+            found is not None and first is not None
+            and _overlap(found) < c.keyframe_overlap * first)
 
-    def _is_elsewhere(self, step: Step) -> bool:
+    def _stays(self, T_reference_sensor: Array, found: Registration | None = None) -> bool:
+        """Whether a scan that was found there changes nothing of the keyframes."""
+        return not (self._is_elsewhere(T_reference_sensor)
+                    or self._makes_keyframe(T_reference_sensor, found))
+
+    def _is_elsewhere(self, T_reference_sensor: Array) -> bool:
         """Whether a scan is far from the newest keyframe that is remembered of this track."""
         last = self._keyframes.last(self._track_id)
         assert self._reference is not None
         return last is None or _is_far(
-            se3.inverse(last.T_odom_sensor) @ self._reference.T_odom_sensor
-            @ step.T_reference_sensor, self.tracker_config)
+            se3.inverse(last.T_odom_sensor) @ self._reference.T_odom_sensor @ T_reference_sensor,
+            self.tracker_config)
+
+
+def _overlap(found: Registration) -> float:
+    return found.evidence.get('agree', 0.0)
 
 
 def _is_far(T: Array, config: TrackerConfig) -> bool:

@@ -63,6 +63,8 @@ class Contest:
     rival_outcomes : (K, n) int8
     slides : tuple of Slide
         Directions in which the clouds slide.
+    weak : bool
+        Whether the surfaces hold any direction so little that it had to be tried.
     """
 
     T_target_source: NDArray[np.float64]
@@ -70,6 +72,7 @@ class Contest:
     rivals: NDArray[np.float64]
     rival_outcomes: NDArray[np.int8]
     slides: tuple[Slide, ...] = ()
+    weak: bool = False
 
 
 def contest(source: View, target: View, T_target_source: NDArray[np.float64],
@@ -115,7 +118,7 @@ def contest(source: View, target: View, T_target_source: NDArray[np.float64],
         if _slides(fitted[[0, 1 + k, 1 + k + len(weak)]], standing[[1 + k, 1 + k + len(weak)]],
                    pushes[k]))
     standing[1:1 + len(pushes)] = False    # these were asked for the slides
-    return _remaining(fitted, many, best, standing, slides, target)
+    return _remaining(fitted, many, best, standing, slides, len(weak) > 0, target)
 
 
 def _keeps_level(source: View, target: View, placements: NDArray[np.float64]
@@ -162,7 +165,8 @@ def _measured(source: View, target: View, T: NDArray[np.float64], outcomes: NDAr
 
 
 def _remaining(placements: NDArray[np.float64], outcomes: NDArray[np.int8], best: int,
-               standing: NDArray[np.bool_], slides: tuple[Slide, ...], target: View) -> Contest:
+               standing: NDArray[np.bool_], slides: tuple[Slide, ...], weak: bool, target: View
+               ) -> Contest:
     """Keep of the rivals that stand those that are really others, the best first."""
     T = placements[best]
     rows = np.flatnonzero(standing)
@@ -174,4 +178,4 @@ def _remaining(placements: NDArray[np.float64], outcomes: NDArray[np.int8], best
                 for other in (best, *kept)]
         if differ(placements[row], np.array(slid), target).all():
             kept.append(int(row))
-    return Contest(T, outcomes[best], placements[kept], outcomes[kept], slides)
+    return Contest(T, outcomes[best], placements[kept], outcomes[kept], slides, weak)
