@@ -8,10 +8,10 @@ from scipy.spatial.transform import Rotation
 from sgor_ros import SgorConfig
 from sgor_ros.core import covariance
 from sgor_ros.core.alignment import align
-from sgor_ros.core.alignment import surface
 from sgor_ros.core.covariance import repeating
 from sgor_ros.core.covariance import scattered
 from sgor_ros.core.covariance import systematic
+from sgor_ros.core.scan.surface import surface
 from sgor_ros.core.scan.voxels import voxel_grid
 
 
@@ -31,7 +31,7 @@ def motion(x, y, z, yaw_deg, pitch_deg=0.0):
 
 
 def aligned(source, target, start):
-    return align(surface(source, 2), surface(target, 2), start, SgorConfig())
+    return align(surface(source, 0.5), surface(target, 0.5), start, SgorConfig())
 
 
 def noise(found):
@@ -106,8 +106,8 @@ def test_a_plane_leaves_directions_open():
 
 
 def test_few_points_have_no_surface():
-    assert surface(np.ones((9, 3)), 1) is None
-    assert surface(np.empty((0, 3)), 1) is None
+    assert surface(np.ones((9, 3)), 0.5) is None
+    assert surface(np.empty((0, 3)), 0.5) is None
 
 
 def test_clouds_without_overlap_end_without_a_covariance(clouds):

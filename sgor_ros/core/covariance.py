@@ -30,34 +30,27 @@ LEAST_MEAN_SQUARE = 0.01
 of the motion. Scans of their own leave 0.05 to 0.12."""
 
 
-def noise(hessian: Array, error: float, pairs: int, T_target_source: Array) -> Array | None:
+def noise(information: Array, error: float, pairs: int) -> Array | None:
     """Return the (6, 6) covariance that GICP's pairs leave, in the target frame.
 
     Parameters
     ----------
-    hessian : (6, 6) float64
-        Of (rotation, translation) on the right of the transformation.
+    information : (6, 6) float64
+        Of (x, y, z, rotation about x, y, z) in the target frame.
     error : float
         Half the sum of the squared Mahalanobis distances.
     pairs : int
-    T_target_source : (4, 4) float64
 
     Returns
     -------
     (6, 6) float64 or None
         Of (x, y, z, rotation about x, y, z); None where a direction is not observed at all.
     """
-    if pairs <= 6 or np.linalg.cond(hessian) > 1e12:
+    if pairs <= 6 or np.linalg.cond(information) > 1e12:
         return None
     # the errors are Mahalanobis: their mean square scales the inverse Hessian
     mean_square = max(2.0 * error / (3 * pairs - 6), LEAST_MEAN_SQUARE)
-    local = np.linalg.inv(hessian) * mean_square * CORRELATED_PAIRS
-    # from (rotation, translation) on the right of T to (translation, rotation) in the target
-    R = T_target_source[:3, :3]
-    to_target = np.zeros((6, 6))
-    to_target[:3, 3:] = R
-    to_target[3:, :3] = R
-    covariance: Array = to_target @ local @ to_target.T
+    covariance: Array = np.linalg.inv(information) * mean_square * CORRELATED_PAIRS
     return (covariance + covariance.T) / 2
 
 

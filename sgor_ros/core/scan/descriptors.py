@@ -120,7 +120,7 @@ def _normals(first, last, points, start, index, squared, limit,  # type: ignore[
                 szz += z * z
         x, y, z = 0.0, 0.0, 1.0
         if n >= 3:
-            x, y, z = _smallest_direction(
+            x, y, z = smallest_direction(
                 sxx / n - sx * sx / (n * n), sxy / n - sx * sy / (n * n),
                 sxz / n - sx * sz / (n * n), syy / n - sy * sy / (n * n),
                 syz / n - sy * sz / (n * n), szz / n - sz * sz / (n * n))
@@ -131,7 +131,7 @@ def _normals(first, last, points, start, index, squared, limit,  # type: ignore[
 
 
 @numba.njit(cache=True, nogil=True)
-def _smallest_direction(xx, xy, xz, yy, yz, zz):  # type: ignore[no-untyped-def]
+def smallest_direction(xx, xy, xz, yy, yz, zz):  # type: ignore[no-untyped-def]
     """Return the unit eigenvector of the smallest eigenvalue of a symmetric 3 x 3 matrix."""
     mean = (xx + yy + zz) / 3
     a, b, c = xx - mean, yy - mean, zz - mean

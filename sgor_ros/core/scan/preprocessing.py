@@ -7,8 +7,6 @@ from numpy.typing import ArrayLike
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from ..alignment import Surface
-from ..alignment import surface
 from ..common.checks import finite_points
 from ..common.settings import InputError
 from ..common.stopwatch import Stopwatch
@@ -33,6 +31,8 @@ from .scale import STREET_VOXEL
 from .scan import Given
 from .scan import PreparedScan
 from .scan import SemanticScan
+from .surface import Surface
+from .surface import surface
 from .voxels import shift_of
 from .voxels import thin
 from .voxels import voxel_grid
@@ -145,7 +145,7 @@ def _fixed_surface(points: NDArray[np.float32], labels: NDArray[np.uint8],
     if len(cloud.points) > config.max_voxels:
         cloud = cloud[thin(len(cloud.points), config.max_voxels)]
     fixed = config.moving_vote | ~np.isin(cloud.labels, list(convention.movable))
-    return surface(cloud.points[fixed], config.threads)
+    return surface(cloud.points[fixed], config.voxel_size)
 
 
 def _usable(scan: SemanticScan, convention: LabelConvention, config: SgorConfig

@@ -5,7 +5,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 from numpy.typing import NDArray
 
-from ..alignment import Surface
 from ..common.checks import as_labels
 from ..common.checks import as_points
 from ..common.checks import finite_rows
@@ -14,6 +13,7 @@ from ..config import SgorConfig
 from ..trust.view import View
 from .features import Features
 from .ground import Ground
+from .surface import Surface
 
 Given = tuple[ArrayLike | None, ArrayLike | None]
 """Keypoints and descriptors of the caller, before they are checked."""

@@ -1,0 +1,133 @@
+"""The surface of one scan for the local refinement: points in columns, each with its normal."""
+from dataclasses import dataclass
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from ..common.threads import shared
+from .descriptors import smallest_direction
+
+NEIGHBOURS, FEWEST = 10, 5
+"""Nearest points behind a normal, itself with them; with fewer than so many there is none."""
+NEAR, FAR = 2, 8
+"""Edges of a column in which the nearest are looked for first, and at last."""
+MOST_COLUMNS = 250_000
+"""Bound on the columns: beyond it empty ones would cost more than full ones."""
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """A thinned cloud with normals, sorted into columns for the search of nearest points.
+
+    Attributes
+    ----------
+    points : (V, 3) float64
+        Metres, column by column.
+    normals : (V, 3) float64
+        Unit normals; zero where too few points are near.
+    first : (nx * ny + 1,) uint32
+        Column c holds the points ``first[c]`` to ``first[c + 1] - 1``.
+    ny : int
+        Columns along y.
+    low : (2,) float64
+        Where the columns begin, metres.
+    edge : float
+        Of a column along x and y, metres.
+    middle_range : float
+        Median distance of the points from the sensor, metres.
+    """
+
+    points: NDArray[np.float64]
+    normals: NDArray[np.float64]
+    first: NDArray[np.uint32]
+    ny: int
+    low: NDArray[np.float64]
+    edge: float
+    middle_range: float
+
+
+def surface(points: NDArray[np.float64], edge: float) -> Surface | None:
+    """Sort (V, 3) thinned points into columns, and find their normals; None with too few.
+
+    Parameters
+    ----------
+    points : (V, 3) float64
+        Metres.
+    edge : float
+        Edge of the grid that thinned them, metres.
+    """
+    if len(points) < NEIGHBOURS:
+        return None
+    low = points[:, :2].min(axis=0)
+    extent = points[:, :2].max(axis=0) - low
+    while np.prod(np.floor(extent / edge) + 1.0) > MOST_COLUMNS:
+        edge *= 1.5
+    nx, ny = np.floor(extent / edge).astype(np.int64) + 1
+    x, y = np.floor((points[:, :2] - low) / edge).astype(np.int64).T
+    columns = x * ny + y
+    points = points[np.argsort(columns, kind='stable')]
+    first = np.zeros(nx * ny + 1, np.uint32)
+    np.cumsum(np.bincount(columns, minlength=nx * ny), out=first[1:])
+    normals = np.zeros((len(points), 3))
+    shared(_normals, len(points), points, first, ny, low, edge, normals)
+    middle = float(np.median(np.sqrt(np.einsum('ij,ij->i', points, points))))
+    return Surface(points, normals, first, int(ny), low, edge, middle)
+
+
+@numba.njit(cache=True, nogil=True, inline='always')
+def window(value, reach, low, edge, count):  # type: ignore[no-untyped-def]
+    """Return the first column within reach of a value, and the one after the last."""
+    # before they are whole numbers: what is far away may be farther than those go
+    return (np.int64(min(max(np.floor((value - reach - low) / edge), 0.0), count)),
+            np.int64(min(max(np.floor((value + reach - low) / edge) + 1.0, 0.0), count)))
+
+
+@numba.njit(cache=True, nogil=True)
+def _normals(begin, end, points, first, ny, low, edge, normals):  # type: ignore[no-untyped-def]
+    nx = (len(first) - 1) // ny
+    near, gaps = np.empty(NEIGHBOURS, np.int64), np.empty(NEIGHBOURS)
+    for i in range(begin, end):
+        x, y, z = points[i, 0], points[i, 1], points[i, 2]
+        reach = NEAR * edge
+        found = 0
+        while True:
+            # the nearest ones, sorted, as far as the columns looked at hold all of them
+            limit = reach * reach
+            found = 0
+            x_first, x_last = window(x, reach, low[0], edge, nx)
+            y_first, y_last = window(y, reach, low[1], edge, ny)
+            for column in range(x_first * ny, x_last * ny, ny):
+                for j in range(first[column + y_first], first[column + y_last]):
+                    a, b, c = points[j, 0] - x, points[j, 1] - y, points[j, 2] - z
+                    gap = a * a + b * b + c * c
+                    if gap <= limit:
+                        k = min(found, NEIGHBOURS - 1)
+                        while k > 0 and gaps[k - 1] > gap:
+                            gaps[k], near[k] = gaps[k - 1], near[k - 1]
+                            k -= 1
+                        gaps[k], near[k] = gap, j
+                        found = min(found + 1, NEIGHBOURS)
+                        if found == NEIGHBOURS:
+                            limit = gaps[NEIGHBOURS - 1]
+            if found == NEIGHBOURS or reach >= FAR * edge:
+                break
+            reach *= 2.0
+        if found < FEWEST:
+            continue
+        sx = sy = sz = sxx = sxy = sxz = syy = syz = szz = 0.0
+        for k in range(found):
+            j = near[k]
+            a, b, c = points[j, 0] - x, points[j, 1] - y, points[j, 2] - z
+            sx += a
+            sy += b
+            sz += c
+            sxx += a * a
+            sxy += a * b
+            sxz += a * c
+            syy += b * b
+            syz += b * c
+            szz += c * c
+        normals[i] = smallest_direction(
+            sxx - sx * sx / found, sxy - sx * sy / found, sxz - sx * sz / found,
+            syy - sy * sy / found, syz - sy * sz / found, szz - sz * sz / found)
