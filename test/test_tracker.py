@@ -314,7 +314,7 @@ def test_without_local_refinement_there_is_no_covariance(scans):
 
 def test_settings_change_between_scans_without_losing_the_track(scans, street):
     """Taken at the next scan; the reference is prepared again with the new ones."""
-    tracker = Tracker()
+    tracker = Tracker(tracker_config=TrackerConfig(predict_first=False))
     first = track(scans[:2], tracker)[1]
     tracker.config = tracker.config.replace(voxel_size=0.7, quick_keypoints=300)
     second = tracker.track(scans[2], 2 * PERIOD_NS)
@@ -331,6 +331,29 @@ def test_settings_change_between_scans_without_losing_the_track(scans, street):
     last = tracker.track(scans[3], 4 * PERIOD_NS)
     assert last.keyframe
     assert_near(last.T_odom_sensor, relative(street[0][2], street[3][2]))
+
+
+@pytest.mark.parametrize('mode', MODES)
+def test_a_prediction_is_tested_once_there_is_one_and_makes_no_keyframe(scans, street, mode):
+    """SGOR finds the first motion and each keyframe that is remembered; the clouds the rest."""
+    results = track(scans, mode=mode, keyframe_distance=4.0)
+    assert [r.confirmed for r in results] == [False, False, True, False]
+    assert len(results[2].registration.hypotheses) == 0 < len(results[3].registration.hypotheses)
+    assert 'matching' not in results[2].timings
+    results = track(scans, mode=mode, predict_first=False)
+    assert not any(r.confirmed for r in results)
+    for i, result in enumerate(results):
+        assert_near(result.T_odom_sensor, relative(street[0][2], street[i][2]))
+
+
+@pytest.mark.parametrize('mode', MODES)
+def test_what_is_not_as_predicted_is_found_by_sgor(scans, street, others, mode):
+    """A stop from 15 m/s, and another place: the prediction is not clung to."""
+    results = track([*scans[:3], scans[2], others[0], scans[3]], mode=mode, **FAR)
+    assert [r.confirmed for r in results] == [False, False, True, False, False, False]
+    assert [r.success for r in results] == [True, True, True, True, False, True]
+    for result, i in ((results[3], 2), (results[5], 3)):
+        assert_near(result.T_odom_sensor, relative(street[0][2], street[i][2]))
 
 
 @pytest.mark.parametrize('mode', MODES)
