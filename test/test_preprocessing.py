@@ -37,12 +37,12 @@ def test_keypoints_stand_over_the_ground(prepared):
 def test_surfaces_have_grids_of_their_own_and_always_the_same(scans, prepared):
     """A scan moved by nothing but its noise is cut elsewhere; the same scan is cut the same."""
     def surface_of(points):
-        return np.array(preprocess(SemanticScan(points, scans[0].labels)).surface.points)
+        return np.array(preprocess(SemanticScan(points, scans[0].labels)).surface.columns.points)
 
     np.testing.assert_array_equal(surface_of(scans[0].points),
-                                  prepared[0].surface.points)
+                                  prepared[0].surface.columns.points)
     other = surface_of(scans[0].points + np.float32(1e-5))
-    far = cKDTree(prepared[0].surface.points).query(other)[0]
+    far = cKDTree(prepared[0].surface.columns.points).query(other)[0]
     assert np.median(far) > 0.02
 
 

@@ -12,8 +12,8 @@ from .covariance import noise
 from .covariance import repeating
 from .covariance import scattered
 from .covariance import systematic
+from .scan.columns import window
 from .scan.surface import Surface
-from .scan.surface import window
 
 FLAT = 0.999
 """How much less a point errs across its surface than along it, in variance (GICP)."""
@@ -58,11 +58,12 @@ def align(source: Surface, target: Surface, T_target_source: NDArray[np.float64]
     As small_gicp does it, by Gauss-Newton and with normals in place of covariances.
     """
     T = np.array(T_target_source, np.float64)
+    here, there = source.columns, target.columns
     sums = np.empty((BLOCKS, 29))
     converged = False
     for _ in range(ROUNDS):
-        shared(_sum_up, BLOCKS, source.points, source.normals, T, target.points, target.normals,
-               target.first, target.ny, target.low, target.edge, config.local_reach, sums)
+        shared(_sum_up, BLOCKS, here.points, source.normals, T, there.points, target.normals,
+               there.first, there.ny, there.low, there.edge, config.local_reach, sums)
         total = sums.sum(axis=0)
         information = np.empty((6, 6))
         information[LOWER] = information.T[LOWER] = total[:21]
@@ -89,7 +90,7 @@ def _nearest(x, y, z, points, first, ny, low, edge, reach):  # type: ignore[no-u
     y_first, y_last = window(y, reach, low[1], edge, ny)
     best, at = reach * reach, -1
     for column in range(x_first * ny, x_last * ny, ny):
-        for j in range(np.int64(first[column + y_first]), np.int64(first[column + y_last])):
+        for j in range(first[column + y_first], first[column + y_last]):
             a, b, c = points[j, 0] - x, points[j, 1] - y, points[j, 2] - z
             gap = a * a + b * b + c * c
             if gap <= best:
@@ -120,14 +121,14 @@ def _sum_up(begin, end, points, normals, T, others, other_normals,  # type: igno
             mx = T[0, 0] * px + T[0, 1] * py + T[0, 2] * pz
             my = T[1, 0] * px + T[1, 1] * py + T[1, 2] * pz
             mz = T[2, 0] * px + T[2, 1] * py + T[2, 2] * pz
-            nx, ny_, nz = other_normals[j, 0], other_normals[j, 1], other_normals[j, 2]
+            ux, uy, uz = other_normals[j, 0], other_normals[j, 1], other_normals[j, 2]
             # the sum of both covariances, and its inverse by cofactors
-            cxx = 2.0 - FLAT * (mx * mx + nx * nx)
-            cyy = 2.0 - FLAT * (my * my + ny_ * ny_)
-            czz = 2.0 - FLAT * (mz * mz + nz * nz)
-            cxy = -FLAT * (mx * my + nx * ny_)
-            cxz = -FLAT * (mx * mz + nx * nz)
-            cyz = -FLAT * (my * mz + ny_ * nz)
+            cxx = 2.0 - FLAT * (mx * mx + ux * ux)
+            cyy = 2.0 - FLAT * (my * my + uy * uy)
+            czz = 2.0 - FLAT * (mz * mz + uz * uz)
+            cxy = -FLAT * (mx * my + ux * uy)
+            cxz = -FLAT * (mx * mz + ux * uz)
+            cyz = -FLAT * (my * mz + uy * uz)
             ixx, ixy, ixz = cyy * czz - cyz * cyz, cxz * cyz - cxy * czz, cxy * cyz - cxz * cyy
             iyy, iyz, izz = cxx * czz - cxz * cxz, cxy * cxz - cxx * cyz, cxx * cyy - cxy * cxy
             scale = 1.0 / (cxx * ixx + cxy * ixy + cxz * ixz)

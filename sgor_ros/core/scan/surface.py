@@ -6,44 +6,33 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common.threads import shared
+from .columns import Columns
+from .columns import in_columns
+from .columns import window
 from .descriptors import smallest_direction
 
 NEIGHBOURS, FEWEST = 10, 5
 """Nearest points behind a normal, itself with them; with fewer than so many there is none."""
 NEAR, FAR = 2, 8
 """Edges of a column in which the nearest are looked for first, and at last."""
-MOST_COLUMNS = 250_000
-"""Bound on the columns: beyond it empty ones would cost more than full ones."""
 
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """A thinned cloud with normals, sorted into columns for the search of nearest points.
+    """A thinned cloud with normals, ready for the search of nearest points.
 
     Attributes
     ----------
-    points : (V, 3) float64
-        Metres, column by column.
+    columns : Columns
+        Its points.
     normals : (V, 3) float64
-        Unit normals; zero where too few points are near.
-    first : (nx * ny + 1,) uint32
-        Column c holds the points ``first[c]`` to ``first[c + 1] - 1``.
-    ny : int
-        Columns along y.
-    low : (2,) float64
-        Where the columns begin, metres.
-    edge : float
-        Of a column along x and y, metres.
+        Unit normals in the order of the columns; zero where too few points are near.
     middle_range : float
         Median distance of the points from the sensor, metres.
     """
 
-    points: NDArray[np.float64]
+    columns: Columns
     normals: NDArray[np.float64]
-    first: NDArray[np.uint32]
-    ny: int
-    low: NDArray[np.float64]
-    edge: float
     middle_range: float
 
 
@@ -59,28 +48,12 @@ def surface(points: NDArray[np.float64], edge: float) -> Surface | None:
     """
     if len(points) < NEIGHBOURS:
         return None
-    low = points[:, :2].min(axis=0)
-    extent = points[:, :2].max(axis=0) - low
-    while np.prod(np.floor(extent / edge) + 1.0) > MOST_COLUMNS:
-        edge *= 1.5
-    nx, ny = np.floor(extent / edge).astype(np.int64) + 1
-    x, y = np.floor((points[:, :2] - low) / edge).astype(np.int64).T
-    columns = x * ny + y
-    points = points[np.argsort(columns, kind='stable')]
-    first = np.zeros(nx * ny + 1, np.uint32)
-    np.cumsum(np.bincount(columns, minlength=nx * ny), out=first[1:])
+    columns = in_columns(points, edge)
     normals = np.zeros((len(points), 3))
-    shared(_normals, len(points), points, first, ny, low, edge, normals)
+    shared(_normals, len(points), columns.points, columns.first, columns.ny, columns.low,
+           columns.edge, normals)
     middle = float(np.median(np.sqrt(np.einsum('ij,ij->i', points, points))))
-    return Surface(points, normals, first, int(ny), low, edge, middle)
-
-
-@numba.njit(cache=True, nogil=True, inline='always')
-def window(value, reach, low, edge, count):  # type: ignore[no-untyped-def]
-    """Return the first column within reach of a value, and the one after the last."""
-    # before they are whole numbers: what is far away may be farther than those go
-    return (np.int64(min(max(np.floor((value - reach - low) / edge), 0.0), count)),
-            np.int64(min(max(np.floor((value + reach - low) / edge) + 1.0, 0.0), count)))
+    return Surface(columns, normals, middle)
 
 
 @numba.njit(cache=True, nogil=True)

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from ..common import se3
 from ..common.threads import shared
+from ..scan.columns import window
 from ..scan.labels import UNLABELLED
 from ..scan.voxels import thin
 from .view import direction
-from .view import slot_of
 from .view import View
 
 AGREE, SILENT, CONTRADICT = 1, 0, -1
@@ -103,18 +103,20 @@ def _ask(source: View, target: View, T: NDArray[np.float64], sample: int, *, rou
          ) -> NDArray[np.int8]:
     rows = thin(len(source.points), sample)
     outcomes = np.zeros((len(T), len(rows)), np.int8)
-    # roughly, whatever is in the cells around is a partner
-    reach, near, margin = ((target.cell, target.cell, target.cell) if rough else
+    # roughly, whatever is around is a partner
+    wide = 2 * target.reach
+    reach, near, margin = ((wide, wide, wide) if rough else
                            (target.reach, ON_SURFACE * target.reach, MARGIN * target.reach))
-    shared(_outcomes, outcomes.size, source.points[rows], source.labels[rows], T, target.points,
-           target.normals, target.labels, target.cell, target.slots, target.chain,
-           target.nearest, reach, near * near, margin, outcomes)
+    columns = target.columns
+    shared(_outcomes, outcomes.size, source.points[rows], source.labels[rows], T, columns.points,
+           target.column_normals, target.column_labels, columns.first, columns.ny, columns.low,
+           columns.edge, target.nearest, reach, near * near, margin, outcomes)
     return outcomes
 
 
 @numba.njit(cache=True, nogil=True)
 def _outcomes(first, last, points, labels, T, others, normals,  # type: ignore[no-untyped-def]
-              other_labels, cell, slots, chain, nearest, reach, limit, margin, outcomes):
+              other_labels, columns, ny, low, edge, nearest, reach, limit, margin, outcomes):
     for task in range(first, last):
         h, i = task // len(points), task % len(points)
         x = T[h, 0, 0] * points[i, 0] + T[h, 0, 1] * points[i, 1] + T[h, 0, 2] * points[i, 2] \
@@ -123,7 +125,7 @@ def _outcomes(first, last, points, labels, T, others, normals,  # type: ignore[n
             + T[h, 1, 3]
         z = T[h, 2, 0] * points[i, 0] + T[h, 2, 1] * points[i, 1] + T[h, 2, 2] * points[i, 2] \
             + T[h, 2, 3]
-        if _on_surface(x, y, z, labels[i], others, normals, other_labels, cell, slots, chain,
+        if _on_surface(x, y, z, labels[i], others, normals, other_labels, columns, ny, low, edge,
                        reach, limit):
             outcomes[h, i] = AGREE
             continue
@@ -136,23 +138,18 @@ def _outcomes(first, last, points, labels, T, others, normals,  # type: ignore[n
 
 
 @numba.njit(cache=True, nogil=True)
-def _on_surface(x, y, z, label, others, normals, other_labels, cell,  # type: ignore[no-untyped-def]
-                slots, chain, reach, limit):
+def _on_surface(x, y, z, label, others, normals, other_labels,  # type: ignore[no-untyped-def]
+                columns, ny, low, edge, reach, limit):
     """Return whether a surface of the same label is near, by `gap` below `limit`."""
-    low, high, shift = cells_around(reach, cell)
-    ix, iy, iz = (np.int64(np.floor(x / cell - shift)), np.int64(np.floor(y / cell - shift)),
-                  np.int64(np.floor(z / cell - shift)))
-    for dx in range(low, high):
-        for dy in range(low, high):
-            for dz in range(low, high):
-                k = slots[slot_of(ix + dx, iy + dy, iz + dz, len(slots) - 1)]
-                while k >= 0:
-                    if alike(label, other_labels[k]):
-                        a, b, c = x - others[k, 0], y - others[k, 1], z - others[k, 2]
-                        squared = a * a + b * b + c * c
-                        if squared <= reach * reach and gap(a, b, c, squared, normals[k]) <= limit:
-                            return True
-                    k = chain[k]
+    x_first, x_last = window(x, reach, low[0], edge, (len(columns) - 1) // ny)
+    y_first, y_last = window(y, reach, low[1], edge, ny)
+    for column in range(x_first * ny, x_last * ny, ny):
+        for k in range(columns[column + y_first], columns[column + y_last]):
+            a, b, c = x - others[k, 0], y - others[k, 1], z - others[k, 2]
+            squared = a * a + b * b + c * c
+            if (squared <= reach * reach and alike(label, other_labels[k])
+                    and gap(a, b, c, squared, normals[k]) <= limit):
+                return True
     return False
 
 
@@ -167,12 +164,3 @@ def gap(a, b, c, squared, normal):  # type: ignore[no-untyped-def]
     """Return the squared distance to a surface: full across it, a share of it along it."""
     across = a * normal[0] + b * normal[1] + c * normal[2]
     return across * across * (1 - TANGENTIAL) + TANGENTIAL * squared
-
-
-@numba.njit(cache=True, nogil=True, inline='always')
-def cells_around(reach, cell):  # type: ignore[no-untyped-def]
-    """Return the range of cells a ball can touch, and the shift that makes them so few.
-
-    Eight for a ball of up to half a cell, 27 for a larger one.
-    """
-    return (0, 2, 0.5) if 2 * reach <= cell * (1 + 1e-9) else (-1, 2, 0.0)

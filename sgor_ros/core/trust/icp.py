@@ -10,13 +10,12 @@ from numpy.typing import NDArray
 
 from ..common import se3
 from ..common.threads import shared
+from ..scan.columns import window
 from ..scan.voxels import thin
 from .evidence import alike
-from .evidence import cells_around
 from .evidence import gap
 from .evidence import ON_SURFACE
 from .evidence import TANGENTIAL
-from .view import slot_of
 from .view import View
 
 SAMPLE = 300
@@ -44,9 +43,10 @@ def icp(source: View, target: View, T_target_source: NDArray[np.float64], wide: 
     """
     rows = thin(len(source.points), sample)
     T = np.array(T_target_source)
-    shared(_icp, len(T), source.points[rows], source.labels[rows], T, target.points,
-           target.normals, target.labels, target.cell, target.slots, target.chain, target.reach,
-           wide, narrow)
+    columns = target.columns
+    shared(_icp, len(T), source.points[rows], source.labels[rows], T, columns.points,
+           target.column_normals, target.column_labels, columns.first, columns.ny, columns.low,
+           columns.edge, target.reach, wide, narrow)
     return T
 
 
@@ -54,50 +54,46 @@ def partners(source: View, target: View, T_target_source: NDArray[np.float64], s
              ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Return rows of source keypoints and of the target keypoints that they lie on, (P,) each."""
     rows = thin(len(source.points), sample)
+    columns = target.columns
     found = np.empty(len(rows), np.int64)
     _partners(se3.transform(T_target_source, source.points[rows]), source.labels[rows],
-              target.points, target.normals, target.labels, target.cell, target.slots,
-              target.chain, target.reach, (ON_SURFACE * target.reach)**2, found)
-    return rows[found >= 0], found[found >= 0]
+              columns.points, target.column_normals, target.column_labels, columns.first,
+              columns.ny, columns.low, columns.edge, target.reach,
+              (ON_SURFACE * target.reach)**2, found)
+    return rows[found >= 0], columns.order[found[found >= 0]]
 
 
 @numba.njit(cache=True, nogil=True)
-def _partners(placed, labels, others, normals, other_labels, cell,  # type: ignore[no-untyped-def]
-              slots, chain, reach, limit, found):
+def _partners(placed, labels, others, normals, other_labels,  # type: ignore[no-untyped-def]
+              columns, ny, low, edge, reach, limit, found):
     for i in range(len(placed)):
         x, y, z = placed[i]
-        at, best = _nearest(x, y, z, labels[i], others, normals, other_labels, cell, slots, chain,
-                            reach)
+        at, best = _nearest(x, y, z, labels[i], others, normals, other_labels, columns, ny, low,
+                            edge, reach)
         found[i] = at if best <= limit else -1
 
 
 @numba.njit(cache=True, nogil=True)
-def _nearest(x, y, z, label, others, normals, other_labels, cell,  # type: ignore[no-untyped-def]
-             slots, chain, reach):
+def _nearest(x, y, z, label, others, normals, other_labels,  # type: ignore[no-untyped-def]
+             columns, ny, low, edge, reach):
     """Return the partner with the smallest gap, -1 without any, and that gap, m^2."""
     best, at = np.inf, -1
-    low, high, shift = cells_around(reach, cell)
-    ix, iy, iz = (np.int64(np.floor(x / cell - shift)), np.int64(np.floor(y / cell - shift)),
-                  np.int64(np.floor(z / cell - shift)))
-    for dx in range(low, high):
-        for dy in range(low, high):
-            for dz in range(low, high):
-                k = slots[slot_of(ix + dx, iy + dy, iz + dz, len(slots) - 1)]
-                while k >= 0:
-                    if alike(label, other_labels[k]):
-                        a, b, c = x - others[k, 0], y - others[k, 1], z - others[k, 2]
-                        squared = a * a + b * b + c * c
-                        if squared <= reach * reach:
-                            found = gap(a, b, c, squared, normals[k])
-                            if found < best:
-                                best, at = found, k
-                    k = chain[k]
+    x_first, x_last = window(x, reach, low[0], edge, (len(columns) - 1) // ny)
+    y_first, y_last = window(y, reach, low[1], edge, ny)
+    for column in range(x_first * ny, x_last * ny, ny):
+        for k in range(columns[column + y_first], columns[column + y_last]):
+            a, b, c = x - others[k, 0], y - others[k, 1], z - others[k, 2]
+            squared = a * a + b * b + c * c
+            if squared <= reach * reach and alike(label, other_labels[k]):
+                found = gap(a, b, c, squared, normals[k])
+                if found < best:
+                    best, at = found, k
     return at, best
 
 
 @numba.njit(cache=True, nogil=True)
 def _icp(first, last, points, labels, T, others, normals, other_labels,  # type: ignore[no-untyped-def]
-         cell, slots, chain, reach, wide, narrow):
+         columns, ny, low, edge, reach, wide, narrow):
     for h in range(first, last):
         rows = np.zeros((4, 6))    # normal, and the three axes: of translation and rotation
         for turn in range(wide + narrow):
@@ -110,19 +106,19 @@ def _icp(first, last, points, labels, T, others, normals, other_labels,  # type:
                 ly = T[h, 1, 0] * px + T[h, 1, 1] * py + T[h, 1, 2] * pz
                 lz = T[h, 2, 0] * px + T[h, 2, 1] * py + T[h, 2, 2] * pz
                 x, y, z = lx + T[h, 0, 3], ly + T[h, 1, 3], lz + T[h, 2, 3]
-                at, found = _nearest(x, y, z, labels[i], others, normals, other_labels, cell,
-                                     slots, chain, far)
+                at, found = _nearest(x, y, z, labels[i], others, normals, other_labels, columns,
+                                     ny, low, edge, far)
                 if at < 0:
                     continue
                 partners += 1
-                nx, ny, nz = normals[at]
+                ux, uy, uz = normals[at]
                 ex, ey, ez = x - others[at, 0], y - others[at, 1], z - others[at, 2]
                 pull = 1 / (1 + found / (SOFTNESS * far)**2)**2
-                rows[0] = (nx, ny, nz, ly * nz - lz * ny, lz * nx - lx * nz, lx * ny - ly * nx)
+                rows[0] = (ux, uy, uz, ly * uz - lz * uy, lz * ux - lx * uz, lx * uy - ly * ux)
                 rows[1] = (1.0, 0.0, 0.0, 0.0, lz, -ly)
                 rows[2] = (0.0, 1.0, 0.0, -lz, 0.0, lx)
                 rows[3] = (0.0, 0.0, 1.0, ly, -lx, 0.0)
-                for r, error in enumerate((ex * nx + ey * ny + ez * nz, ex, ey, ez)):
+                for r, error in enumerate((ex * ux + ey * uy + ez * uz, ex, ey, ez)):
                     weight = pull * (1 - TANGENTIAL if r == 0 else TANGENTIAL)
                     for a in range(6):
                         g[a] += weight * rows[r, a] * error

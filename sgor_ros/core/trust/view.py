@@ -7,6 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common.angles import atan2
+from ..scan.columns import Columns
+from ..scan.columns import in_columns
 from ..scan.features import Features
 
 AZIMUTHS, ELEVATIONS = 360, 180
@@ -51,10 +53,10 @@ class View:
         Their regional labels.
     reach : float
         Farthest partner of a point that counts, metres.
-    cell : float
-        Cell size of the point hash, metres: twice the reach.
-    slots, chain : (S,) int32, (V,) int32
-        Hash of the cells: first point of a slot, next point with the same slot.
+    columns : Columns
+        The keypoints in columns, with
+    column_normals, column_labels : (V, 3) float64, (V,) uint8
+        Normals and labels in their order.
     nearest : (360, 180) float32
         Shortest range measured in each direction or next to it, metres; infinite where nothing
         was.
@@ -69,9 +71,9 @@ class View:
     normals: NDArray[np.float64]
     labels: NDArray[np.uint8]
     reach: float
-    cell: float
-    slots: NDArray[np.int32]
-    chain: NDArray[np.int32]
+    columns: Columns
+    column_normals: NDArray[np.float64]
+    column_labels: NDArray[np.uint8]
     nearest: NDArray[np.float32]
     axes: NDArray[np.float64]
     level: bool
@@ -95,9 +97,10 @@ def view(points: NDArray[np.float32], features: Features, normals: NDArray[np.fl
     reach : float
         Farthest partner of a keypoint that counts, metres.
     """
-    slots, chain = _hash_points(features.points, 2 * reach)
+    columns = in_columns(features.points, reach)
     axes = np.eye(3) if up is None else np.vstack((np.linalg.svd(up[None])[2][1:], up))
-    return View(features.points, normals, features.regional, reach, 2 * reach, slots, chain,
+    return View(features.points, normals, features.regional, reach, columns,
+                normals[columns.order], features.regional[columns.order],
                 _shortest_around(_range_image(points)), axes, up is not None,
                 _overhead(features.points @ axes.T, normals @ axes.T, features.regional, reach))
 
@@ -138,29 +141,6 @@ def map_bits(kinds: NDArray[np.int64], sectors: NDArray[np.int64]) -> NDArray[np
 def _mark(x, y, bits, cells):  # type: ignore[no-untyped-def]
     for i in range(len(x)):
         cells[x[i] - 1:x[i] + 2, y[i] - 1:y[i] + 2] |= bits[i]
-
-
-@numba.njit(cache=True, nogil=True, inline='always')
-def slot_of(x, y, z, mask):  # type: ignore[no-untyped-def]
-    """Return where in the hash a cell begins."""
-    key = x * np.int64(73856093) ^ y * np.int64(19349663) ^ z * np.int64(83492791)
-    return (key ^ (key >> 15)) & mask
-
-
-@numba.njit(cache=True, nogil=True)
-def _hash_points(points, cell):  # type: ignore[no-untyped-def]
-    size = 1024
-    while size < 2 * len(points):
-        size *= 2
-    slots = np.full(size, -1, np.int32)
-    chain = np.full(len(points), -1, np.int32)
-    for i in range(len(points)):
-        slot = slot_of(np.int64(np.floor(points[i, 0] / cell)),
-                       np.int64(np.floor(points[i, 1] / cell)),
-                       np.int64(np.floor(points[i, 2] / cell)), size - 1)
-        chain[i] = slots[slot]
-        slots[slot] = i
-    return slots, chain
 
 
 @numba.njit(cache=True, nogil=True, inline='always')
