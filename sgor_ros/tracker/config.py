@@ -25,7 +25,7 @@ class TrackerConfig(Settings):
         math.radians(20.0), 'A scan turned by more from its keyframe becomes the next', 'rad',
         minimum=0.01, maximum=math.pi)
     keyframe_overlap: float = setting(
-        0.5, 'A scan whose keypoints lie on surfaces of its keyframe less often than this share '
+        0.6, 'A scan whose keypoints lie on surfaces of its keyframe less often than this share '
         'of the first scan after it becomes the next', minimum=0.0, maximum=1.0)
     max_keyframes: int = setting(
         10, 'Keyframes to remember; where there are more, the one goes that leaves the '

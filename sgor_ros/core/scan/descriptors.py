@@ -17,6 +17,8 @@ from .voxels import winning_labels
 
 BINS = 11
 DESCRIPTOR_SIZE = 3 * BINS
+PARTS = 4
+"""Parts of the points, each with histograms of its own, for two write into those of one point."""
 
 
 def regional_labels(cloud: VoxelCloud, neighbours: Neighbours, radius: float) -> NDArray[np.uint8]:
@@ -70,9 +72,12 @@ def fpfh(points: NDArray[np.float64], point_normals: NDArray[np.float64],
     (V, 33) float32
         Unit rows; a row of zeros where a point has no neighbour.
     """
-    simple = np.zeros((len(points), DESCRIPTOR_SIZE), np.float32)
-    shared(_simple_histograms, len(points), points.astype(np.float32),
-           point_normals.astype(np.float32), neighbours.start, neighbours.index, simple)
+    counts = np.zeros((PARTS, len(points), DESCRIPTOR_SIZE), np.int32)
+    shared(_count_angles, PARTS, points.astype(np.float32), point_normals.astype(np.float32),
+           neighbours.start, neighbours.index, counts)
+    pairs = np.maximum(np.diff(neighbours.start).astype(np.float32) - 1, 1)
+    simple: NDArray[np.float32] = counts.sum(axis=0, dtype=np.float32)
+    simple *= (np.float32(100.0) / pairs)[:, None]
     full = np.zeros_like(simple)
     shared(_weighted_histograms, len(points), simple, neighbours.start, neighbours.index,
            neighbours.squared, full)
@@ -187,60 +192,72 @@ def _cosine_bin(cosine):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True, error_model='numpy',
             fastmath={'nsz', 'arcp', 'contract', 'afn', 'reassoc'})
-def _simple_histograms(first, last, points, normals, start, index,  # type: ignore[no-untyped-def]
-                       simple):
-    """SPFH of each point: angles of the Darboux frame to every neighbour, 11 bins each."""
-    for i in range(np.uint64(first), np.uint64(last)):
-        count = start[i + 1] - start[i] - 1
-        if count < 1:
-            continue
-        bins = np.empty((3, count), np.int32)
-        px, py, pz = points[i, 0], points[i, 1], points[i, 2]
-        nx, ny, nz = normals[i, 0], normals[i, 1], normals[i, 2]
-        row = start[i] + 1
-        for k in range(count):
-            j = index[row + k]
-            dx = points[j, 0] - px
-            dy = points[j, 1] - py
-            dz = points[j, 2] - pz
-            mx, my, mz = normals[j, 0], normals[j, 1], normals[j, 2]
-            inverse = np.float32(1.0) / math.sqrt(dx * dx + dy * dy + dz * dz)
-            here = (nx * dx + ny * dy + nz * dz) * inverse
-            there = (mx * dx + my * dy + mz * dz) * inverse
-            # the end whose normal is nearer to the line is the source of the frame
-            swap = abs(here) < abs(there)
-            sign = np.float32(-1.0) if swap else np.float32(1.0)
-            ux = mx if swap else nx
-            uy = my if swap else ny
-            uz = mz if swap else nz
-            tx = nx if swap else mx
-            ty = ny if swap else my
-            tz = nz if swap else mz
-            phi = -there if swap else here
-            vx = (dy * uz - dz * uy) * sign
-            vy = (dz * ux - dx * uz) * sign
-            vz = (dx * uy - dy * ux) * sign
-            length = math.sqrt(vx * vx + vy * vy + vz * vz)
-            scale = np.float32(1.0) / length if length > 0 else np.float32(0.0)
-            vx *= scale
-            vy *= scale
-            vz *= scale
-            wx = uy * vz - uz * vy
-            wy = uz * vx - ux * vz
-            wz = ux * vy - uy * vx
-            alpha = vx * tx + vy * ty + vz * tz
-            flat = length == 0
-            theta_y = np.float32(0.0) if flat else wx * tx + wy * ty + wz * tz
-            theta_x = np.float32(1.0) if flat else ux * tx + uy * ty + uz * tz
-            phi = np.float32(0.0) if flat else phi
-            bins[0, k] = _angle_bin(theta_y, theta_x)
-            bins[1, k] = _cosine_bin(alpha)
-            bins[2, k] = _cosine_bin(phi)
-        step = np.float32(100.0 / count)
-        for k in range(count):
-            simple[i, bins[0, k]] += step
-            simple[i, BINS + bins[1, k]] += step
-            simple[i, 2 * BINS + bins[2, k]] += step
+def _count_angles(first, last, points, normals, start, index,  # type: ignore[no-untyped-def]
+                  counts):
+    """SPFH of each point: angles of the Darboux frame to every neighbour, 11 bins each.
+
+    They are the same from either end, and so are counted for both at once.
+    """
+    longest = np.uint64(0)
+    for i in range(len(points)):
+        longest = max(longest, start[i + 1] - start[i])
+    later, bins = np.empty(longest, np.uint32), np.empty((3, longest), np.int32)
+    size = np.uint64(len(points))
+    parts = np.uint64(len(counts))
+    for part in range(np.uint64(first), np.uint64(last)):
+        own = counts[part]
+        for i in range(size * part // parts, size * (part + np.uint64(1)) // parts):
+            count = np.uint64(0)
+            for k in range(start[i] + np.uint64(1), start[i + np.uint64(1)]):
+                later[count] = index[k]
+                count += np.uint64(index[k] > i)
+            px, py, pz = points[i, 0], points[i, 1], points[i, 2]
+            nx, ny, nz = normals[i, 0], normals[i, 1], normals[i, 2]
+            for k in range(count):
+                j = later[k]
+                dx = points[j, 0] - px
+                dy = points[j, 1] - py
+                dz = points[j, 2] - pz
+                mx, my, mz = normals[j, 0], normals[j, 1], normals[j, 2]
+                inverse = np.float32(1.0) / math.sqrt(dx * dx + dy * dy + dz * dz)
+                here = (nx * dx + ny * dy + nz * dz) * inverse
+                there = (mx * dx + my * dy + mz * dz) * inverse
+                # the end whose normal is nearer to the line is the source of the frame
+                swap = abs(here) < abs(there)
+                sign = np.float32(-1.0) if swap else np.float32(1.0)
+                ux = mx if swap else nx
+                uy = my if swap else ny
+                uz = mz if swap else nz
+                tx = nx if swap else mx
+                ty = ny if swap else my
+                tz = nz if swap else mz
+                phi = -there if swap else here
+                vx = (dy * uz - dz * uy) * sign
+                vy = (dz * ux - dx * uz) * sign
+                vz = (dx * uy - dy * ux) * sign
+                length = math.sqrt(vx * vx + vy * vy + vz * vz)
+                scale = np.float32(1.0) / length if length > 0 else np.float32(0.0)
+                vx *= scale
+                vy *= scale
+                vz *= scale
+                wx = uy * vz - uz * vy
+                wy = uz * vx - ux * vz
+                wz = ux * vy - uy * vx
+                alpha = vx * tx + vy * ty + vz * tz
+                flat = length == 0
+                theta_y = np.float32(0.0) if flat else wx * tx + wy * ty + wz * tz
+                theta_x = np.float32(1.0) if flat else ux * tx + uy * ty + uz * tz
+                phi = np.float32(0.0) if flat else phi
+                bins[0, k] = _angle_bin(theta_y, theta_x)
+                bins[1, k] = _cosine_bin(alpha)
+                bins[2, k] = _cosine_bin(phi)
+            here_counts = own[i]
+            for k in range(count):
+                there_counts = own[later[k]]
+                for angle in range(3):
+                    at = angle * BINS + bins[angle, k]
+                    here_counts[at] += 1
+                    there_counts[at] += 1
 
 
 @numba.njit(cache=True, nogil=True, error_model='numpy', fastmath=True)
