@@ -9,6 +9,7 @@ from sgor_ros import SemanticScan
 from sgor_ros.core.scan.features import Features
 from sgor_ros.core.trust.evidence import evidence
 from sgor_ros.core.trust.evidence import rank
+from sgor_ros.core.trust.view import range_image
 from sgor_ros.core.trust.view import view
 
 REACH = 0.6
@@ -25,7 +26,7 @@ def keypoints(points, labels):
 
 def view_of(points, keys, facing=(-1.0, 0.0, 0.0)):
     """Return the view of a sensor whose keypoints all face one way."""
-    return view(points, keys, np.tile(facing, (len(keys.points), 1)), UP, REACH)
+    return view(range_image(points), keys, np.tile(facing, (len(keys.points), 1)), UP, REACH)
 
 
 @pytest.fixture(scope='module')

@@ -22,6 +22,7 @@ from sgor_ros.core.trust.degeneracy import weak_directions
 from sgor_ros.core.trust.degeneracy import without_slides
 from sgor_ros.core.trust.icp import icp
 from sgor_ros.core.trust.rivals import contest
+from sgor_ros.core.trust.view import range_image
 from sgor_ros.core.trust.view import view
 from sgor_ros.world import Lidar
 from sgor_ros.world import scenes
@@ -66,7 +67,7 @@ def view_of(points, normals, up=UP):
     steps = np.arange(-0.25, 0.3, 0.1)
     dense = np.concatenate([points + (i * normals[:, [1, 0, 2]] + [0, 0, j])
                             for i in steps for j in steps])
-    return view(dense.astype(np.float32), features, normals, up, REACH)
+    return view(range_image(dense.astype(np.float32)), features, normals, up, REACH)
 
 
 @pytest.fixture(scope='module')

@@ -10,8 +10,10 @@ from scipy.spatial import cKDTree
 from ..common.checks import finite_points
 from ..common.settings import InputError
 from ..common.stopwatch import Stopwatch
+from ..common.tasks import at_once
 from ..common.threads import cores
 from ..config import SgorConfig
+from ..trust.view import range_image
 from ..trust.view import view
 from .context import context_classes
 from .context import semantic_context
@@ -101,21 +103,11 @@ def _prepare(scan: SemanticScan, asked: SgorConfig, given: Given | None,
         if len(cloud.points) > config.max_voxels:
             warnings.append(f'{len(cloud.points)} voxels thinned to {config.max_voxels}')
             cloud = cloud[thin(len(cloud.points), config.max_voxels)]
-    with clock('surface'):
-        local = _fixed_surface(points, labels, convention, config)
-    with clock('ground'):
-        ground = segment_ground(cloud, convention.ground, config)
-        if ground is not None and config.correspondence_preprocessing:
-            cloud = cloud[~ground.mask]
-    with clock('neighbours'):
-        radius = max(config.vote_radius, config.normal_radius)
-        neighbours = radius_neighbours(cloud.points, radius)
-    with clock('votes'):
-        regional = regional_labels(cloud, neighbours, config.vote_radius)
-        keep = ~np.isin(regional, _unmatched_classes(convention, config))
-    with clock('normals'):
-        directions = normals(cloud.points, neighbours, config.normal_radius, keep)[keep]
-    cloud, regional = cloud[keep], regional[keep]
+    local, (cloud, regional, directions, ground), nearest = at_once(
+        asked.threads,
+        partial(_fixed_surface, points, labels, convention, config, clock),
+        partial(_segmented, cloud, convention, config, clock),
+        partial(_seen, points, clock))
     if given is None:
         features = Features(cloud.points, cloud.labels, regional, partial(
             _described, cloud.points, directions, config.descriptor_radius))
@@ -130,22 +122,48 @@ def _prepare(scan: SemanticScan, asked: SgorConfig, given: Given | None,
         if ground.source == 'geometry':
             warnings.append('no ground labels: ground plane found by geometry')
     with clock('view'):
-        sight = view(points, features, directions, None if ground is None else ground.normal,
+        sight = view(nearest, features, directions, None if ground is None else ground.normal,
                      config.evidence_reach)
     return PreparedScan(scan, asked, scale, features, ground, sight, local, tuple(warnings),
                         clock.seconds, given)
 
 
+def _seen(points: NDArray[np.float32], clock: Stopwatch) -> NDArray[np.float32]:
+    with clock('range image'):
+        return range_image(points)
+
+
+def _segmented(cloud: VoxelCloud, convention: LabelConvention, config: SgorConfig,
+               clock: Stopwatch) -> tuple[VoxelCloud, NDArray[np.uint8], NDArray[np.float64],
+                                          Ground | None]:
+    """Return the voxels that may be matched, their regional labels and normals; the ground."""
+    with clock('ground'):
+        ground = segment_ground(cloud, convention.ground, config)
+        if ground is not None and config.correspondence_preprocessing:
+            cloud = cloud[~ground.mask]
+    with clock('neighbours'):
+        radius = max(config.vote_radius, config.normal_radius)
+        neighbours = radius_neighbours(cloud.points, radius)
+    with clock('votes'):
+        regional = regional_labels(cloud, neighbours, config.vote_radius)
+        keep = ~np.isin(regional, _unmatched_classes(convention, config))
+    with clock('normals'):
+        directions = normals(cloud.points, neighbours, config.normal_radius, keep)
+    return cloud[keep], regional[keep], directions[keep], ground
+
+
 def _fixed_surface(points: NDArray[np.float32], labels: NDArray[np.uint8],
-                   convention: LabelConvention, config: SgorConfig) -> Surface | None:
+                   convention: LabelConvention, config: SgorConfig, clock: Stopwatch
+                   ) -> Surface | None:
     """Return the surface of all that stands still, on a grid that no other scan has."""
     if not config.local_refinement:
         return None
-    cloud = voxel_grid(points, labels, config.voxel_size, shift_of(points))
-    if len(cloud.points) > config.max_voxels:
-        cloud = cloud[thin(len(cloud.points), config.max_voxels)]
-    fixed = config.moving_vote | ~np.isin(cloud.labels, list(convention.movable))
-    return surface(cloud.points[fixed], config.voxel_size)
+    with clock('surface'):
+        cloud = voxel_grid(points, labels, config.voxel_size, shift_of(points))
+        if len(cloud.points) > config.max_voxels:
+            cloud = cloud[thin(len(cloud.points), config.max_voxels)]
+        fixed = config.moving_vote | ~np.isin(cloud.labels, list(convention.movable))
+        return surface(cloud.points[fixed], config.voxel_size)
 
 
 def _usable(scan: SemanticScan, convention: LabelConvention, config: SgorConfig

@@ -80,14 +80,14 @@ class View:
     overhead: OverheadMap
 
 
-def view(points: NDArray[np.float32], features: Features, normals: NDArray[np.float64],
+def view(nearest: NDArray[np.float32], features: Features, normals: NDArray[np.float64],
          up: NDArray[np.float64] | None, reach: float) -> View:
     """Prepare what one scan can say.
 
     Parameters
     ----------
-    points : (N, 3) float32
-        All points of the scan, in the sensor frame: the sensor has looked through all before them.
+    nearest : (360, 180) float32
+        The `range_image` of the scan.
     features : Features
         Its keypoints.
     normals : (V, 3) float64
@@ -101,7 +101,7 @@ def view(points: NDArray[np.float32], features: Features, normals: NDArray[np.fl
     axes = np.eye(3) if up is None else np.vstack((np.linalg.svd(up[None])[2][1:], up))
     return View(features.points, normals, features.regional, reach, columns,
                 normals[columns.order], features.regional[columns.order],
-                _shortest_around(_range_image(points)), axes, up is not None,
+                nearest, axes, up is not None,
                 _overhead(features.points @ axes.T, normals @ axes.T, features.regional, reach))
 
 
@@ -149,6 +149,14 @@ def direction(x, y, z):  # type: ignore[no-untyped-def]
     azimuth = int((atan2(y, x) / (2 * math.pi) + 0.5) * AZIMUTHS)
     elevation = int((atan2(z, math.sqrt(x * x + y * y)) / math.pi + 0.5) * ELEVATIONS)
     return min(max(azimuth, 0), AZIMUTHS - 1), min(max(elevation, 0), ELEVATIONS - 1)
+
+
+def range_image(points: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return the shortest range measured in each direction or next to it, metres.
+
+    Of all (N, 3) points of a scan, in the sensor frame: it has looked through all before them.
+    """
+    return _shortest_around(_range_image(points))
 
 
 @numba.njit(cache=True, nogil=True)
