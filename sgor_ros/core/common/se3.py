@@ -5,6 +5,9 @@ from scipy.spatial.transform import Rotation
 
 Array = NDArray[np.float64]
 
+NEARLY_HALF = -0.99
+"""Cosine of turns by nearly half."""
+
 
 def transform(T_target_source: Array, points: Array) -> Array:
     """Move (N, 3) points of the source into the target."""
@@ -27,7 +30,33 @@ def compose(R: Array, t: Array) -> Array:
 
 def angle(R: Array) -> float:
     """Return the angle of a (3, 3) rotation, radians in [0, pi]."""
-    return float(Rotation.from_matrix(R).magnitude())
+    return float(np.linalg.norm(rotation_vectors(R)))
+
+
+def rotation_vectors(R: Array) -> Array:
+    """Return the vectors of (..., 3, 3) rotations, (..., 3): axis times angle, up to pi.
+
+    Scipy's take ten times as long, which adds up to milliseconds a scan.
+    """
+    sines = np.stack((R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0],
+                      R[..., 1, 0] - R[..., 0, 1]), axis=-1) / 2
+    sine = np.sqrt((sines * sines).sum(axis=-1))
+    cosine = (R[..., 0, 0] + R[..., 1, 1] + R[..., 2, 2] - 1) / 2
+    vectors: Array = sines * (np.arctan2(sine, cosine) / np.maximum(sine, 1e-300))[..., None]
+    half = cosine < NEARLY_HALF
+    if half.any():    # there the sines say little of the axis
+        vectors[half] = Rotation.from_matrix(R[half]).as_rotvec()
+    return vectors
+
+
+def rotations(vectors: Array) -> Array:
+    """Return the (..., 3, 3) rotations of (..., 3) vectors."""
+    K = np.zeros((*vectors.shape, 3))
+    K[..., 2, 1], K[..., 0, 2], K[..., 1, 0] = np.moveaxis(vectors, -1, 0)
+    K[..., 1, 2], K[..., 2, 0], K[..., 0, 1] = -np.moveaxis(vectors, -1, 0)
+    angles = np.sqrt((vectors * vectors).sum(axis=-1))[..., None, None]
+    return np.asarray(np.eye(3) + np.sinc(angles / np.pi) * K
+                      + np.sinc(angles / (2 * np.pi))**2 / 2 * (K @ K))
 
 
 def skew(v: Array) -> Array:
@@ -37,12 +66,12 @@ def skew(v: Array) -> Array:
 
 def exp(twist: Array) -> Array:
     """Return the (4, 4) motion of a (6,) twist, linear first, that acts for a unit of time."""
-    return compose(Rotation.from_rotvec(twist[3:]).as_matrix(), _left(twist[3:]) @ twist[:3])
+    return compose(rotations(twist[3:]), _left(twist[3:]) @ twist[:3])
 
 
 def log(T: Array) -> Array:
     """Return the (6,) twist whose motion is a (4, 4) transformation; the inverse of `exp`."""
-    turn = Rotation.from_matrix(T[:3, :3]).as_rotvec()
+    turn = rotation_vectors(T[:3, :3])
     return np.concatenate((np.linalg.solve(_left(turn), T[:3, 3]), turn))
 
 
@@ -59,13 +88,13 @@ def perturbation(T: Array, T_from: Array) -> Array:
 
     Both in the frame that the poses are given in, as covariances of poses are.
     """
-    turn = Rotation.from_matrix(T[:3, :3] @ T_from[:3, :3].T).as_rotvec()
+    turn = rotation_vectors(T[:3, :3] @ T_from[:3, :3].T)
     return np.concatenate((T[:3, 3] - T_from[:3, 3], turn))
 
 
 def perturbed(T: Array, by: Array) -> Array:
     """Return a (4, 4) pose moved by a (6,) `perturbation`."""
-    return compose(Rotation.from_rotvec(by[3:]).as_matrix() @ T[:3, :3], T[:3, 3] + by[:3])
+    return compose(rotations(by[3:]) @ T[:3, :3], T[:3, 3] + by[:3])
 
 
 def carried(lever: Array) -> Array:

@@ -1,8 +1,8 @@
 """Two placements compared: whether they differ, and which of them free space rules out."""
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
+from ..common import se3
 from .evidence import AGREE
 from .evidence import CONTRADICT
 from .view import View
@@ -41,10 +41,7 @@ def differ(T: NDArray[np.float64], others: NDArray[np.float64], target: View,
     On level ground only shifts and turns in its plane count: the ground holds the rest, and the
     keypoints are none of it.
     """
-    if not len(others):
-        return np.zeros(0, np.bool_)    # of which older versions of scipy make no rotations
-    turned: NDArray[np.float64] = Rotation.from_matrix(
-        others[:, :3, :3] @ T[:3, :3].T).as_rotvec()
+    turned = se3.rotation_vectors(others[:, :3, :3] @ T[:3, :3].T)
     shifted = others[:, :3, 3] - T[:3, 3]
     if target.level:
         turned, shifted = turned @ target.axes[2:].T, shifted @ target.axes[:2].T

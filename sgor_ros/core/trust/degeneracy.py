@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
+from ..common import se3
 from .icp import partners
 from .view import View
 
@@ -96,9 +96,7 @@ def pushed(T_target_source: NDArray[np.float64], twists: NDArray[np.float64]
            ) -> NDArray[np.float64]:
     """Move a placement by (K, 6) twists about its own origin, (K, 4, 4)."""
     moved = np.tile(T_target_source, (len(twists), 1, 1))
-    if not len(twists):
-        return moved    # of which older versions of scipy make no rotations
-    moved[:, :3, :3] = Rotation.from_rotvec(twists[:, 3:]).as_matrix() @ T_target_source[:3, :3]
+    moved[:, :3, :3] = se3.rotations(twists[:, 3:]) @ T_target_source[:3, :3]
     moved[:, :3, 3] += twists[:, :3]
     return moved
 
@@ -107,8 +105,7 @@ def without_slides(T: NDArray[np.float64], other: NDArray[np.float64], slides: t
                    ) -> NDArray[np.float64]:
     """Slide `other` back towards T as far as the free directions let it, (4, 4)."""
     for slide in slides:
-        gap = np.concatenate((T[:3, 3] - other[:3, 3], Rotation.from_matrix(
-            T[:3, :3] @ other[:3, :3].T).as_rotvec()))
+        gap = se3.perturbation(T, other)
         # a slide is a translation or a turn; the other part is a by-product
         part = slice(0, 3) if is_shift(slide.twist) else slice(3, 6)
         length = gap[part] @ slide.twist[part] / (slide.twist[part] @ slide.twist[part])

@@ -1,8 +1,8 @@
 """Rivals along weak directions, where ICP hardly pulls: looked for step by step."""
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
+from ..common import se3
 from .comparison import differ
 from .comparison import LEAST_SUPPORT
 from .degeneracy import PUSH
@@ -32,7 +32,7 @@ def along_ridges(source: View, target: View, T: NDArray[np.float64],
     support = (few == AGREE).sum(axis=1)
     rows = np.flatnonzero(support >= LEAST_SUPPORT * support[0])
     placements = np.concatenate((T[None], others))[rows]
-    turned = Rotation.from_matrix(placements[:, :3, :3] @ T[:3, :3].T).magnitude()
+    turned = np.linalg.norm(se3.rotation_vectors(placements[:, :3, :3] @ T[:3, :3].T), axis=1)
     quarters = np.round(turned / (np.pi / 2))
     seeds = [placements[quarters == quarter][np.argmax(support[rows][quarters == quarter])]
              for quarter in np.unique(quarters)]

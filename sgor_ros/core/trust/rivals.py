@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
+from ..common import se3
 from .comparison import apart
 from .comparison import differ
 from .comparison import exclusive
@@ -137,7 +137,8 @@ def _slides(placements: NDArray[np.float64], standing: NDArray[np.bool_],
         came = np.linalg.norm(placements[1:, :3, 3] - placements[0, :3, 3], axis=1)
         wanted = np.linalg.norm(push[:3])
     else:
-        came = Rotation.from_matrix(placements[1:, :3, :3] @ placements[0, :3, :3].T).magnitude()
+        came = np.linalg.norm(se3.rotation_vectors(
+            placements[1:, :3, :3] @ placements[0, :3, :3].T), axis=1)
         wanted = np.linalg.norm(push[3:])
     return bool(standing.any() and came.mean() > STAYS * wanted)
 
