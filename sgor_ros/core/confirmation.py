@@ -50,7 +50,8 @@ def confirm(source: PreparedScan, target: PreparedScan, T_target_source: NDArray
         return replace(expected, success=False, reason='no rivals are looked for'
                        if config.rival_radius == 0 else 'the scans differ in scale')
     config = config.scaled(source.scale)
-    config = config.replace(min_confidence=max(config.min_confidence, LEAST_CONFIDENCE))
+    if config.min_confidence < LEAST_CONFIDENCE:
+        config = config.replace(min_confidence=LEAST_CONFIDENCE)
     with cores(config.threads):
         with clock('rivals'):
             found, contest = compete(expected, source.view, target.view, config)

@@ -65,24 +65,28 @@ def _normals(begin, end, points, first, ny, low, edge, normals):  # type: ignore
         reach = NEAR * edge
         found = 0
         while True:
-            # the nearest ones, sorted, as far as the columns looked at hold all of them
+            # the nearest ones, as far as the columns looked at hold all of them
             limit = reach * reach
-            found = 0
+            found, worst = 0, 0
             x_first, x_last = window(x, reach, low[0], edge, nx)
             y_first, y_last = window(y, reach, low[1], edge, ny)
             for column in range(x_first * ny, x_last * ny, ny):
                 for j in range(first[column + y_first], first[column + y_last]):
                     a, b, c = points[j, 0] - x, points[j, 1] - y, points[j, 2] - z
                     gap = a * a + b * b + c * c
-                    if gap <= limit:
-                        k = min(found, NEIGHBOURS - 1)
-                        while k > 0 and gaps[k - 1] > gap:
-                            gaps[k], near[k] = gaps[k - 1], near[k - 1]
-                            k -= 1
-                        gaps[k], near[k] = gap, j
-                        found = min(found + 1, NEIGHBOURS)
-                        if found == NEIGHBOURS:
-                            limit = gaps[NEIGHBOURS - 1]
+                    if gap > limit:
+                        continue
+                    if found < NEIGHBOURS:
+                        gaps[found], near[found] = gap, j
+                        found += 1
+                    else:
+                        gaps[worst], near[worst] = gap, j
+                    if found == NEIGHBOURS:
+                        limit = gaps[0]
+                        for k in range(1, NEIGHBOURS):
+                            limit = max(limit, gaps[k])
+                        for k in range(NEIGHBOURS):
+                            worst = k if gaps[k] == limit else worst
             if found == NEIGHBOURS or reach >= FAR * edge:
                 break
             reach *= 2.0

@@ -55,7 +55,7 @@ def voxel_grid(points: NDArray[np.float32], labels: NDArray[np.uint8], voxel_siz
         In the order in which voxels first appear in the scan.
     """
     classes, column = _columns(labels)
-    means, votes = _accumulate(points, column[labels], voxel_size, shift, classes.size)
+    means, votes = _accumulate(points, labels, column, voxel_size, shift, classes.size)
     return VoxelCloud(means, votes, classes, winning_labels(votes, classes))
 
 
@@ -101,7 +101,8 @@ def _columns(labels: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], NDArray[np.i
 
 
 @numba.njit(cache=True, nogil=True)
-def _accumulate(points, columns, voxel_size, shift, n_classes):  # type: ignore[no-untyped-def]
+def _accumulate(points, labels, columns, voxel_size, shift,  # type: ignore[no-untyped-def]
+                n_classes):
     """Hash each point to its voxel; sum coordinates and votes."""
     n = len(points)
     n_slots = 1
@@ -140,8 +141,8 @@ def _accumulate(points, columns, voxel_size, shift, n_classes):  # type: ignore[
         sums[v, 1] += points[i, 1]
         sums[v, 2] += points[i, 2]
         members[v] += 1.0
-        if columns[i] >= 0:
-            votes[v, columns[i]] += 1
+        if columns[labels[i]] >= 0:
+            votes[v, columns[labels[i]]] += 1
     for v in range(count):
         scale = 1.0 / members[v]
         sums[v, 0] *= scale
