@@ -202,6 +202,10 @@ def _count_angles(first, last, points, normals, start, index,  # type: ignore[no
     for i in range(len(points)):
         longest = max(longest, start[i + 1] - start[i])
     later, bins = np.empty(longest, np.uint32), np.empty((3, longest), np.int32)
+    # side by side, so that the compiler makes vectors of them
+    copies = np.empty((6, longest), np.float32)
+    cx, cy, cz, cu, cv, cw = copies[0], copies[1], copies[2], copies[3], copies[4], copies[5]
+    thetas, alphas, phis = bins[0], bins[1], bins[2]
     size = np.uint64(len(points))
     parts = np.uint64(len(counts))
     for part in range(np.uint64(first), np.uint64(last)):
@@ -215,10 +219,11 @@ def _count_angles(first, last, points, normals, start, index,  # type: ignore[no
             nx, ny, nz = normals[i, 0], normals[i, 1], normals[i, 2]
             for k in range(count):
                 j = later[k]
-                dx = points[j, 0] - px
-                dy = points[j, 1] - py
-                dz = points[j, 2] - pz
-                mx, my, mz = normals[j, 0], normals[j, 1], normals[j, 2]
+                cx[k], cy[k], cz[k] = points[j, 0], points[j, 1], points[j, 2]
+                cu[k], cv[k], cw[k] = normals[j, 0], normals[j, 1], normals[j, 2]
+            for k in range(count):
+                dx, dy, dz = cx[k] - px, cy[k] - py, cz[k] - pz
+                mx, my, mz = cu[k], cv[k], cw[k]
                 inverse = np.float32(1.0) / math.sqrt(dx * dx + dy * dy + dz * dz)
                 here = (nx * dx + ny * dy + nz * dz) * inverse
                 there = (mx * dx + my * dy + mz * dz) * inverse
@@ -248,16 +253,15 @@ def _count_angles(first, last, points, normals, start, index,  # type: ignore[no
                 theta_y = np.float32(0.0) if flat else wx * tx + wy * ty + wz * tz
                 theta_x = np.float32(1.0) if flat else ux * tx + uy * ty + uz * tz
                 phi = np.float32(0.0) if flat else phi
-                bins[0, k] = _angle_bin(theta_y, theta_x)
-                bins[1, k] = _cosine_bin(alpha)
-                bins[2, k] = _cosine_bin(phi)
+                thetas[k] = _angle_bin(theta_y, theta_x)
+                alphas[k] = BINS + _cosine_bin(alpha)
+                phis[k] = 2 * BINS + _cosine_bin(phi)
             here_counts = own[i]
             for k in range(count):
                 there_counts = own[later[k]]
                 for angle in range(3):
-                    at = angle * BINS + bins[angle, k]
-                    here_counts[at] += 1
-                    there_counts[at] += 1
+                    here_counts[bins[angle, k]] += 1
+                    there_counts[bins[angle, k]] += 1
 
 
 @numba.njit(cache=True, nogil=True, error_model='numpy', fastmath=True)
