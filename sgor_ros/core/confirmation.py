@@ -1,19 +1,25 @@
 """Whether a transformation that somebody expects is right: judged by the clouds, without SGOR."""
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .alignment import Alignment
 from .common.stopwatch import Stopwatch
+from .common.tasks import at_once
 from .common.threads import cores
 from .config import SgorConfig
-from .registration import locally
+from .registration import aligned
+from .registration import settled
 from .registration import with_grounds
 from .result import Registration
 from .scan.scan import PreparedScan
 from .solver.refinement import unobservable
 from .trust.acceptance import compete
+from .trust.comparison import differ
 from .trust.icp import partners
+from .trust.rivals import Contest
 from .trust.rivals import MANY
 
 LEAST_CONFIDENCE = SgorConfig().min_confidence
@@ -53,17 +59,37 @@ def confirm(source: PreparedScan, target: PreparedScan, T_target_source: NDArray
     if config.min_confidence < LEAST_CONFIDENCE:
         config = config.replace(min_confidence=LEAST_CONFIDENCE)
     with cores(config.threads):
-        with clock('rivals'):
-            found, contest = compete(expected, source.view, target.view, config)
-            if not found.success or contest is None:
-                return found
-            if contest.weak:
-                return replace(found, success=False, reason='a direction is held weakly')
-            rows, at = partners(source.view, target.view, contest.T_target_source, MANY)
-        found = replace(found, source_points=source.view.points[rows],
-                        target_points=target.view.points[at],
-                        inliers=np.ones(len(rows), np.bool_))
-        reason = unobservable(found.source_points, found.target_points, config)
+        (found, contest), local = at_once(
+            config.threads, partial(_contested, expected, source, target, config, clock),
+            partial(aligned, source, target, T_target_source, config, clock))
+        if not found.success or contest is None:
+            return found
+        reason = _doubt(found, local, contest, target, config)
         if reason:
             return replace(found, success=False, reason=reason)
-        return with_grounds(locally(found, contest, source, target, config, clock), source, target)
+        return with_grounds(settled(found, local, contest, source, target, config, clock),
+                            source, target)
+
+
+def _contested(expected: Registration, source: PreparedScan, target: PreparedScan,
+               config: SgorConfig, clock: Stopwatch) -> tuple[Registration, Contest | None]:
+    """Let it compete with its rivals; its correspondences are what lies on each other."""
+    with clock('rivals'):
+        found, contest = compete(expected, source.view, target.view, config)
+        if contest is None:
+            return found, None
+        rows, at = partners(source.view, target.view, contest.T_target_source, MANY)
+        return replace(found, source_points=source.view.points[rows],
+                       target_points=target.view.points[at],
+                       inliers=np.ones(len(rows), np.bool_)), contest
+
+
+def _doubt(found: Registration, local: Alignment | None, contest: Contest, target: PreparedScan,
+           config: SgorConfig) -> str:
+    """Say why it is not confirmed although it fits; empty where nothing speaks against it."""
+    if contest.weak:
+        return 'a direction is held weakly'
+    if local is not None and differ(contest.T_target_source, local.T_target_source[None],
+                                    target.view).any():
+        return 'keypoints and surfaces disagree'
+    return unobservable(found.source_points, found.target_points, config)

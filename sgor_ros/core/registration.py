@@ -1,12 +1,16 @@
 """SGOR on one screen: `register` two scans, `solve` for the transformation of matches."""
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
+from numpy.typing import NDArray
 
 from .alignment import align
+from .alignment import Alignment
 from .common.stopwatch import Stopwatch
+from .common.tasks import at_once
 from .common.threads import cores
 from .config import SgorConfig
 from .matching.correspondences import Correspondences
@@ -56,12 +60,12 @@ def register(source: SemanticScan | PreparedScan, target: SemanticScan | Prepare
         return _register(source, target, config)
 
 
-def _register(source: SemanticScan | PreparedScan, target: SemanticScan | PreparedScan,
+def _register(one: SemanticScan | PreparedScan, other: SemanticScan | PreparedScan,
               config: SgorConfig) -> Registration:
     clock = Stopwatch()
     with clock('preprocessing'):
-        source = source if isinstance(source, PreparedScan) else preprocess(source, config)
-        target = target if isinstance(target, PreparedScan) else preprocess(target, config)
+        source, target = at_once(config.threads, partial(_prepared, one, config),
+                                 partial(_prepared, other, config))
         if source.scale != target.scale:    # the coarser one costs less and sees farther
             source, target = (at_scale(scan, max(source.scale, target.scale))
                               for scan in (source, target))
@@ -74,8 +78,12 @@ def _register(source: SemanticScan | PreparedScan, target: SemanticScan | Prepar
         if result.success:
             break
     if result.success and contest is not None:
-        result = locally(result, contest, source, target, config, clock)
+        result = _locally(result, contest, source, target, config, clock)
     return with_grounds(result, source, target)
+
+
+def _prepared(scan: SemanticScan | PreparedScan, config: SgorConfig) -> PreparedScan:
+    return scan if isinstance(scan, PreparedScan) else preprocess(scan, config)
 
 
 def with_grounds(result: Registration, source: PreparedScan, target: PreparedScan
@@ -122,10 +130,10 @@ def _globally(source: PreparedScan, target: PreparedScan, config: SgorConfig,
     p, q = source.features, target.features
     with clock('descriptors'):
         # made by the first attempt that needs them, and kept
-        _ = p.descriptors, q.descriptors
+        at_once(config.threads, lambda: p.descriptors, lambda: q.descriptors)
     if config.context_weight > 0:
         with clock('context'):
-            _ = p.context, q.context
+            at_once(config.threads, lambda: p.context, lambda: q.context)
     with clock('matching'):
         if config.correspondence_preprocessing and config.semantics != 'none':
             p, q = overlap_region(p, q)
@@ -137,13 +145,30 @@ def _globally(source: PreparedScan, target: PreparedScan, config: SgorConfig,
         return compete(result, source.view, target.view, config)
 
 
-def locally(result: Registration, contest: Contest, source: PreparedScan, target: PreparedScan,
-            config: SgorConfig, clock: Stopwatch) -> Registration:
+def _locally(result: Registration, contest: Contest, source: PreparedScan, target: PreparedScan,
+             config: SgorConfig, clock: Stopwatch) -> Registration:
     """Refine on the clouds, and judge again beside the rivals (beyond the paper)."""
     assert result.T_target_source is not None
-    if source.surface is not None and target.surface is not None:
-        with clock('alignment'):
-            local = align(source.surface, target.surface, result.T_target_source, config)
+    local = aligned(source, target, result.T_target_source, config, clock)
+    return settled(result, local, contest, source, target, config, clock)
+
+
+def aligned(source: PreparedScan, target: PreparedScan, T_target_source: NDArray[np.float64],
+            config: SgorConfig, clock: Stopwatch) -> Alignment | None:
+    """Refine a transformation on the clouds; None where that is off or they are too small."""
+    with clock('surface'):
+        p, q = at_once(config.threads, source.surfaced, target.surfaced)
+    if p is None or q is None:
+        return None
+    with clock('alignment'):
+        return align(p, q, T_target_source, config)
+
+
+def settled(result: Registration, local: Alignment | None, contest: Contest,
+            source: PreparedScan, target: PreparedScan, config: SgorConfig, clock: Stopwatch
+            ) -> Registration:
+    """Take the refined transformation, and judge it beside the rivals."""
+    if local is not None:
         agree = distances(local.T_target_source, result.source_points,
                           result.target_points) < config.tau_1
         result = replace(result, T_target_source=local.T_target_source,

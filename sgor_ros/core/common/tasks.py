@@ -1,20 +1,22 @@
-"""Tasks that run at once, as far as there are cores."""
+"""Two tasks that run at once, where there are cores for it."""
 from collections.abc import Callable
-from typing import Any
 
 from .threads import cores
 from .threads import shared
 
 
-def at_once(threads: int, *tasks: Callable[[], Any]) -> list[Any]:
-    """Run tasks on up to so many threads; return what they return, in their order."""
-    found: list[Any] = [None] * len(tasks)
+def at_once[A, B](threads: int, one: Callable[[], A], other: Callable[[], B]) -> tuple[A, B]:
+    """Run two tasks, on up to so many threads together; return what they return."""
+    first: list[A] = []
+    second: list[B] = []
 
-    def run(first: int, last: int) -> None:
+    def run(begin: int, end: int) -> None:
         # what is allowed is said anew: each thread of the pool has a limit of its own
         with cores(threads):
-            for k in range(first, last):
-                found[k] = tasks[k]()
+            if begin == 0:
+                first.append(one())
+            if end == 2:
+                second.append(other())
 
-    shared(run, len(tasks))
-    return found
+    shared(run, 2)
+    return first[0], second[0]

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from ..common.checks import finite_points
+from ..common.later import Later
 from ..common.settings import InputError
 from ..common.stopwatch import Stopwatch
 from ..common.tasks import at_once
@@ -88,26 +89,21 @@ def _prepare(scan: SemanticScan, asked: SgorConfig, given: Given | None,
              scale_before: float | None) -> PreparedScan:
     convention = label_convention(asked.label_convention)
     clock = Stopwatch()
-    with clock('voxel grid'):
-        scale, config = asked.scale or 1.0, asked.scaled(asked.scale or 1.0)
-        points, labels, warnings = _usable(scan, convention, config)
-        cloud = voxel_grid(points, labels, config.voxel_size)
-        if asked.scale == 0:
+    scale = asked.scale or 1.0
+    config, points, labels, warnings, cloud, nearest = _gridded(scan, convention, asked, scale,
+                                                                clock)
+    if asked.scale == 0:
+        with clock('voxel grid'):
             even = cloud if config.voxel_size == STREET_VOXEL else voxel_grid(
                 points, labels, STREET_VOXEL)
             scale = scale_of(even.points, scale_before)
-            if scale != 1:
-                config = asked.scaled(scale)
-                points, labels, warnings = _usable(scan, convention, config)
-                cloud = voxel_grid(points, labels, config.voxel_size)
-        if len(cloud.points) > config.max_voxels:
-            warnings.append(f'{len(cloud.points)} voxels thinned to {config.max_voxels}')
-            cloud = cloud[thin(len(cloud.points), config.max_voxels)]
-    local, (cloud, regional, directions, ground), nearest = at_once(
-        asked.threads,
-        partial(_fixed_surface, points, labels, convention, config, clock),
-        partial(_segmented, cloud, convention, config, clock),
-        partial(_seen, points, clock))
+        if scale != 1:
+            config, points, labels, warnings, cloud, nearest = _gridded(
+                scan, convention, asked, scale, clock)
+    if len(cloud.points) > config.max_voxels:
+        warnings.append(f'{len(cloud.points)} voxels thinned to {config.max_voxels}')
+        cloud = cloud[thin(len(cloud.points), config.max_voxels)]
+    cloud, regional, directions, ground = _segmented(cloud, convention, config, clock)
     if given is None:
         features = Features(cloud.points, cloud.labels, regional, partial(
             _described, cloud.points, directions, config.descriptor_radius))
@@ -124,13 +120,23 @@ def _prepare(scan: SemanticScan, asked: SgorConfig, given: Given | None,
     with clock('view'):
         sight = view(nearest, features, directions, None if ground is None else ground.normal,
                      config.evidence_reach)
-    return PreparedScan(scan, asked, scale, features, ground, sight, local, tuple(warnings),
-                        clock.seconds, given)
+    return PreparedScan(
+        scan, asked, scale, features, ground, sight,
+        Later(partial(_fixed_surface, points, labels, convention, config)), tuple(warnings),
+        clock.seconds, given)
 
 
-def _seen(points: NDArray[np.float32], clock: Stopwatch) -> NDArray[np.float32]:
-    with clock('range image'):
-        return range_image(points)
+def _gridded(scan: SemanticScan, convention: LabelConvention, asked: SgorConfig, scale: float,
+             clock: Stopwatch) -> tuple[SgorConfig, NDArray[np.float32], NDArray[np.uint8],
+                                        list[str], VoxelCloud, NDArray[np.float32]]:
+    """Return settings of a scale, usable points, labels, warnings, voxels and range image."""
+    config = asked.scaled(scale)
+    with clock('voxel grid'):
+        points, labels, warnings = _usable(scan, convention, config)
+        cloud, nearest = at_once(
+            config.threads, partial(voxel_grid, points, labels, config.voxel_size),
+            partial(range_image, points))
+    return config, points, labels, warnings, cloud, nearest
 
 
 def _segmented(cloud: VoxelCloud, convention: LabelConvention, config: SgorConfig,
@@ -153,17 +159,15 @@ def _segmented(cloud: VoxelCloud, convention: LabelConvention, config: SgorConfi
 
 
 def _fixed_surface(points: NDArray[np.float32], labels: NDArray[np.uint8],
-                   convention: LabelConvention, config: SgorConfig, clock: Stopwatch
-                   ) -> Surface | None:
+                   convention: LabelConvention, config: SgorConfig) -> Surface | None:
     """Return the surface of all that stands still, on a grid that no other scan has."""
     if not config.local_refinement:
         return None
-    with clock('surface'):
-        cloud = voxel_grid(points, labels, config.voxel_size, shift_of(points))
-        if len(cloud.points) > config.max_voxels:
-            cloud = cloud[thin(len(cloud.points), config.max_voxels)]
-        fixed = config.moving_vote | ~np.isin(cloud.labels, list(convention.movable))
-        return surface(cloud.points[fixed], config.voxel_size)
+    cloud = voxel_grid(points, labels, config.voxel_size, shift_of(points))
+    if len(cloud.points) > config.max_voxels:
+        cloud = cloud[thin(len(cloud.points), config.max_voxels)]
+    fixed = config.moving_vote | ~np.isin(cloud.labels, list(convention.movable))
+    return surface(cloud.points[fixed], config.voxel_size)
 
 
 def _usable(scan: SemanticScan, convention: LabelConvention, config: SgorConfig

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from ..common.checks import as_labels
 from ..common.checks import as_points
 from ..common.checks import finite_rows
+from ..common.later import Later
 from ..common.settings import InputError
 from ..config import SgorConfig
 from ..trust.view import View
@@ -73,8 +74,8 @@ class PreparedScan:
         None where no ground plane was found.
     view : View
         What it can say about transformations.
-    surface : Surface or None
-        Cloud for the local refinement; None where that is off or there are too few points.
+    surfaced : Later of Surface or None
+        Makes `surface`.
     warnings : tuple of str
         What was odd about the scan, in words.
     timings : dict of str to float
@@ -89,7 +90,12 @@ class PreparedScan:
     features: Features
     ground: Ground | None
     view: View
-    surface: Surface | None
+    surfaced: Later[Surface | None]
     warnings: tuple[str, ...]
     timings: dict[str, float]
     given: Given | None = None
+
+    @property
+    def surface(self) -> Surface | None:
+        """Cloud for the local refinement; None where that is off or there are too few points."""
+        return self.surfaced()
