@@ -15,7 +15,6 @@ from .registration import settled
 from .registration import with_grounds
 from .result import Registration
 from .scan.scan import PreparedScan
-from .solver.refinement import unobservable
 from .trust.acceptance import compete
 from .trust.comparison import differ
 from .trust.icp import partners
@@ -92,4 +91,6 @@ def _doubt(found: Registration, local: Alignment | None, contest: Contest, targe
     if local is not None and differ(contest.T_target_source, local.T_target_source[None],
                                     target.view).any():
         return 'keypoints and surfaces disagree'
-    return unobservable(found.source_points, found.target_points, config)
+    if len(found.inliers) < config.min_inliers:
+        return f'only {len(found.inliers)} keypoints on surfaces'
+    return ''

@@ -79,7 +79,7 @@ def thin(count: int, most: int) -> NDArray[np.intp]:
     """Return at most `most` of the indices 0 to count - 1, evenly spread."""
     if count <= most:
         return np.arange(count)
-    return np.linspace(0, count - 1, most).astype(np.intp)
+    return np.arange(most) * (count - 1) // max(most - 1, 1)
 
 
 def winning_labels(votes: NDArray[np.int32], classes: NDArray[np.uint8]) -> NDArray[np.uint8]:
