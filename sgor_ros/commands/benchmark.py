@@ -107,7 +107,7 @@ def wrong(arguments: Namespace) -> int:
 
 def ablation(arguments: Namespace) -> int:
     """Turn the mechanisms off, one at a time, as the paper does and ours too."""
-    methods = ablations.methods(arguments.cores)
+    methods = ablations.methods(arguments.cores, only_paper=arguments.paper)
     right = _right_pairs(arguments, _drives(arguments), arguments.pairs)
     rows = running.run_pairs(right, methods, arguments.seed)
     names = [method.name for method in methods]
