@@ -1,4 +1,4 @@
-"""`SgorConfig.paper()` from points to transformation, against the dense reference of Eq. 2 to 20."""
+"""`SgorConfig.paper()` from points to transformation: the dense reference of Eq. 2 to 20."""
 from conftest import errors
 from conftest import relative
 import dense_reference as dense
