@@ -33,7 +33,7 @@ def refined(matches: Matches, T_target_source: Array, limit: float) -> Array:
     for _ in range(REFINEMENTS):
         distance = residuals(matches, T_target_source)
         near = distance < limit
-        count = np.count_nonzero(near)
+        count = int(np.count_nonzero(near))
         if count == before or count < 3:
             break
         before = count

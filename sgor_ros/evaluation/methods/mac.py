@@ -1,8 +1,8 @@
 """MAC: maximal cliques of a compatibility graph (Zhang et al., CVPR 2023), from the paper.
 
 The cliques are found by igraph. Of all maximal cliques those stay that are the heaviest of one of
-their members (node-guided clique selection). Where the graph is so dense that its cliques cannot be
-listed, it is thinned.
+their members (node-guided clique selection). Where the graph is so dense that its cliques cannot
+be listed, it is thinned.
 """
 from itertools import combinations
 

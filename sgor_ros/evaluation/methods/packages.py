@@ -1,4 +1,6 @@
 """Solvers of other packages on given matches; each imported only when run."""
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,10 +22,9 @@ def ransac(matches: Matches) -> Solution:
         _cloud(matches.source), _cloud(matches.target), o3d.utility.Vector2iVector(pairs),
         matches.inlier_m, registration.TransformationEstimationPointToPoint(False), 3,
         [registration.CorrespondenceCheckerBasedOnEdgeLength(0.9),
-         registration.CorrespondenceCheckerBasedOnDistance(matches.inlier_m)], registration.RANSACConvergenceCriteria(ITERATIONS, 0.999))
-    inliers = np.asarray(found.correspondence_set)
-    return Solution(np.array(found.transformation), inliers[:, 0].astype(np.intp)
-                    if len(inliers) else None)
+         registration.CorrespondenceCheckerBasedOnDistance(matches.inlier_m)],
+        registration.RANSACConvergenceCriteria(ITERATIONS, 0.999))
+    return Solution(np.array(found.transformation))
 
 
 def fast_global(matches: Matches) -> Solution:
@@ -54,6 +55,6 @@ def kiss_matcher_solver(matches: Matches) -> Solution:
     return Solution(se3.compose(R, np.asarray(solution.translation, np.float64).reshape(3)))
 
 
-def _cloud(points: NDArray[np.float64]) -> object:
+def _cloud(points: NDArray[np.float64]) -> Any:
     import open3d as o3d
     return o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))

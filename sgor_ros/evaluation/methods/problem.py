@@ -2,9 +2,15 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
+from typing import Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 from numpy.typing import NDArray
+
+from ...core.config import SgorConfig
+from ...core.matching.correspondences import Correspondences
+from ...core.matching.correspondences import given_correspondences
 
 Array = NDArray[np.float64]
 
@@ -15,22 +21,32 @@ class Matches:
 
     Attributes
     ----------
-    source, target : (N, 3) float64
-        Row i of one is held to be the same place as row i of the other, metres.
+    correspondences : Correspondences
+        With the labels of both ends.
     inlier_m : float
         A match is right below this distance: 0.6 outdoors, 0.1 indoors.
-    source_labels, target_labels : (N,) int64, optional
-        Ids of the label convention of the configuration.
-    ground_normals : pair of (3,) float64, optional
+    ground_normals : pair of (3,) float64 or None
         Of source and target, towards the sensor.
     """
 
-    source: Array
-    target: Array
+    correspondences: Correspondences
     inlier_m: float
-    source_labels: NDArray[np.int64] | None = None
-    target_labels: NDArray[np.int64] | None = None
     ground_normals: tuple[Array, Array] | None = None
+
+    @property
+    def source(self) -> Array:
+        """(N, 3) points of the source, metres."""
+        return self.correspondences.source
+
+    @property
+    def target(self) -> Array:
+        """(N, 3) points of the target: row i is held to be the same place as source row i."""
+        return self.correspondences.target
+
+    @classmethod
+    def of(cls, source: ArrayLike, target: ArrayLike, inlier_m: float) -> Self:
+        """Return matches of (N, 3) arrays, without labels."""
+        return cls(given_correspondences(source, target, None, None, SgorConfig()), inlier_m)
 
 
 class Solution(NamedTuple):

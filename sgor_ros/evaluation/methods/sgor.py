@@ -1,24 +1,21 @@
 """SGOR itself, in any configuration."""
 from functools import partial
 
-import numpy as np
-
+from ...core.common.stopwatch import Stopwatch
+from ...core.common.threads import cores
 from ...core.config import SgorConfig
-from ...core.registration import register_correspondences
+from ...core.registration import solve
 from .problem import Matches
 from .problem import Method
 from .problem import Solution
 
 
 def sgor(config: SgorConfig) -> Method:
-    """Return SGOR as a method of the tables."""
+    """Return SGOR as a method of the tables; like the others it answers, trusted or not."""
     return partial(_sgor, config)
 
 
 def _sgor(config: SgorConfig, matches: Matches) -> Solution:
-    found = register_correspondences(
-        matches.source, matches.target, matches.source_labels, matches.target_labels,
-        ground_normals=matches.ground_normals, config=config)
-    # a table counts answers, trusted or not, as it does for the others
-    kept = np.flatnonzero(found.inliers) if found.T_target_source is not None else None
-    return Solution(found.T_target_source, kept)
+    with cores(config.threads):
+        found = solve(matches.correspondences, matches.ground_normals, None, config, Stopwatch())
+    return Solution(found.T_target_source)
