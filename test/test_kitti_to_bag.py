@@ -102,9 +102,9 @@ def broken(sequence, what):
         return 'times.txt: 3 rows, but the scans go up to number 6'
     if what == 'times missing':
         (sequence / 'times.txt').unlink()
-        return 'times.txt: no times'
+        return 'times.txt: cannot be read'
     np.savetxt(sequence / 'poses.txt', np.tile(np.eye(4)[:3].reshape(-1), (10, 1)))
-    return 'calib.txt: no row Tr'
+    return 'calib.txt: cannot be read'
 
 
 @pytest.mark.parametrize('what', [

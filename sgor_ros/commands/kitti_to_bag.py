@@ -14,7 +14,9 @@ from ..io.bags import BagWriter
 from ..io.messages import odometry_of
 from ..io.messages import point_cloud2
 from ..io.scans import read_scan
-from ..io.trajectories import read_kitti
+from ..io.trajectories import read_calibration
+from ..io.trajectories import read_poses
+from ..io.trajectories import read_times
 from .options import parser
 from .options import run
 
@@ -91,12 +93,9 @@ def _rows(scans: list[Path]) -> list[int]:
 
 
 def _stamps_ns(path: Path, rows: list[int]) -> list[int]:
-    try:
-        seconds = np.loadtxt(path, ndmin=1)
-    except (OSError, ValueError) as error:
-        raise InputError(f'{path}: no times: {error}') from error
-    _check_length(path, len(seconds), rows)
-    return [round(s * 1e9) for s in seconds[rows].tolist()]
+    stamps_ns = read_times(path)
+    _check_length(path, len(stamps_ns), rows)
+    return [stamps_ns[row] for row in rows]
 
 
 def _lidar_poses(folder: Path, rows: list[int]) -> NDArray[np.float64] | None:
@@ -104,9 +103,9 @@ def _lidar_poses(folder: Path, rows: list[int]) -> NDArray[np.float64] | None:
     path = folder / 'poses.txt'
     if not path.is_file():
         return None
-    cameras = read_kitti(path)
+    cameras = read_poses(path)
     _check_length(path, len(cameras), rows)
-    T_camera_lidar = _calibration(folder / 'calib.txt')
+    T_camera_lidar = read_calibration(folder / 'calib.txt')
     lidars = se3.inverse(T_camera_lidar) @ cameras[rows] @ T_camera_lidar
     return se3.inverse(lidars[0]) @ lidars
 
@@ -114,17 +113,6 @@ def _lidar_poses(folder: Path, rows: list[int]) -> NDArray[np.float64] | None:
 def _check_length(path: Path, length: int, rows: list[int]) -> None:
     if length <= max(rows):
         raise InputError(f'{path}: {length} rows, but the scans go up to number {max(rows)}')
-
-
-def _calibration(path: Path) -> NDArray[np.float64]:
-    """Return Tr, which maps points of the LiDAR into the left camera."""
-    try:
-        rows = dict(line.split(':', 1) for line in path.read_text().splitlines() if ':' in line)
-        values = np.array(rows['Tr'].split(), np.float64).reshape(3, 4)
-    except (OSError, KeyError, ValueError) as error:
-        raise InputError(f'{path}: no row Tr of 12 numbers, which the poses need: '
-                         f'{error}') from error
-    return se3.compose(values[:, :3], values[:, 3])
 
 
 if __name__ == '__main__':

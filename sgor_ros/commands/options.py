@@ -90,7 +90,7 @@ def read_parameters(arguments: Namespace, known: Iterable[Setting]) -> dict[str,
     try:
         content = yaml.safe_load(path.read_text())
         nodes = [node['ros__parameters'] for node in content.values()]
-        parameters = {name: value for node in nodes for name, value in node.items()}
+        parameters = {str(name): value for node in nodes for name, value in node.items()}
     except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
         raise InputError(f'--params-file {path}: cannot be read: {error}') from error
     except (AttributeError, KeyError, TypeError) as error:

@@ -19,7 +19,8 @@ from ..core.common.settings import InputError
 from ..core.config import SgorConfig
 from ..core.scan.scan import SemanticScan
 from ..io.scans import read_scan
-from ..io.trajectories import read_kitti
+from ..io.trajectories import read_calibration
+from ..io.trajectories import read_poses
 
 Array = NDArray[np.float64]
 
@@ -161,15 +162,10 @@ def _best_labels(scan: Path) -> Path | None:
 
 def _sensor_poses(path: Path) -> Array:
     """Return the poses of the LiDAR, (N, 4, 4); camera poses are turned into them by Tr."""
-    poses = read_kitti(path / 'poses.txt')
+    poses = read_poses(path / 'poses.txt')
     if not (path / 'calib.txt').is_file():
         return poses
-    rows = [line.split()[1:] for line in (path / 'calib.txt').read_text().splitlines()
-            if line.startswith('Tr')]
-    if not rows or len(rows[0]) != 12:
-        raise InputError(f'{path}/calib.txt: expected a line "Tr:" and 12 numbers')
-    T_camera_sensor = np.eye(4)
-    T_camera_sensor[:3] = np.array(rows[0], np.float64).reshape(3, 4)
+    T_camera_sensor = read_calibration(path / 'calib.txt')
     return np.asarray(se3.inverse(T_camera_sensor) @ poses @ T_camera_sensor)
 
 

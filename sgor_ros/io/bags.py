@@ -1,7 +1,6 @@
 """Bags without ROS, by rosbags: ROS 1 .bag, ROS 2 sqlite3 and mcap."""
 from collections.abc import Callable
 from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -18,6 +17,7 @@ from rosbags.typesys import get_typestore
 from rosbags.typesys import Stores
 
 from ..core.common.settings import InputError
+from .broken import readable
 from .label_field import field_names
 from .label_field import label_field_of
 from .messages import stamp_ns_of
@@ -60,13 +60,13 @@ class BagReader:
         self.path = Path(path)
         if not self.path.exists():
             raise InputError(f'{path}: no such bag')
-        with _readable(self.path):
+        with readable(self.path):
             self._reader = AnyReader(
                 [self.path], default_typestore=get_typestore(Stores.ROS2_JAZZY))
 
     def __enter__(self) -> Self:
         """Open the bag."""
-        with _readable(self.path):
+        with readable(self.path):
             self._reader.open()
         return self
 
@@ -123,7 +123,7 @@ class BagReader:
                               if c.topic == topic and c.msgtype == CLOUD_TYPE])
 
     def _iterate(self, connections: list[Connection]) -> Iterator[RecordedCloud]:
-        with _readable(self.path):
+        with readable(self.path):
             for _, time_ns, raw in self._reader.messages(connections):
                 yield RecordedCloud(time_ns, partial(self._read, raw))
 
@@ -135,7 +135,7 @@ class BagReader:
         return label_field_of(first, label_field) in field_names(first)
 
     def _read(self, raw: bytes) -> tuple[int, str, Any]:
-        with _readable('a message of the bag'):
+        with readable('a message of the bag'):
             message: Any = self._reader.deserialize(raw, CLOUD_TYPE)
             return stamp_ns_of(message.header), message.header.frame_id, message
 
@@ -186,15 +186,3 @@ class BagWriter:
                 topic, kind, typestore=self._store)
         self._writer.write(self._connections[topic], time_ns,
                            self._store.serialize_cdr(message, kind))
-
-
-@contextmanager
-def _readable(what: Path | str) -> Iterator[None]:
-    """Turn what a parser of broken bytes raises, which can be anything, into one error."""
-    try:
-        yield
-    except InputError:
-        raise
-    except Exception as error:
-        raise InputError(f'{what}: cannot be read: '
-                         f'{str(error) or type(error).__name__}') from error

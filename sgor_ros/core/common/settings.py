@@ -101,6 +101,22 @@ class Settings:
                      for f in dataclasses.fields(cls))
 
     @classmethod
+    def given(cls, config: Self | None) -> Self:
+        """Return a configuration as a caller hands it in; the defaults where that is None.
+
+        Raises
+        ------
+        InputError
+            Something else, such as a dict.
+        """
+        if config is None:
+            return cls()
+        if isinstance(config, cls):
+            return config
+        advice = f'; {cls.__name__}(**values) makes one of it' if isinstance(config, dict) else ''
+        raise InputError(f'config: expected {cls.__name__}, got {type(config).__name__}{advice}')
+
+    @classmethod
     def from_values(cls, values: dict[str, Any]) -> Self:
         """Build from a mapping, refusing names that are no fields.
 

@@ -1,0 +1,32 @@
+"""Parsers of bytes that are not what they should be: whatever they raise, it is one error."""
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from ..core.common.settings import InputError
+
+WORDS = 200
+"""Characters of what a parser says; some repeat the file."""
+
+
+@contextmanager
+def readable(what: Path | str) -> Iterator[None]:
+    """Turn what a parser of broken bytes raises, which can be anything, into one error.
+
+    Parameters
+    ----------
+    what : str or Path
+        What is read, the subject of the message.
+
+    Raises
+    ------
+    InputError
+    """
+    try:
+        yield
+    except InputError:
+        raise
+    except Exception as error:
+        said = ' '.join(str(error).split())
+        raise InputError(f'{what}: cannot be read: '
+                         f'{said[:WORDS] or type(error).__name__}') from error
