@@ -13,7 +13,7 @@ COMMANDS = {
     'sgor_benchmark': 'sgor_ros.commands.benchmark',
     'sgor_demo': 'sgor_ros.commands.demo',
 }
-# .pcd and .ply files, and the built-in world; the module of open3d without CUDA
+# the built-in world; the module of open3d without CUDA
 OPEN3D = ['open3d-cpu>=0.18']
 
 setup(
@@ -26,6 +26,7 @@ setup(
     license='Apache-2.0',
     python_requires='>=3.12',
     packages=find_packages(include=['sgor_ros', 'sgor_ros.*']),
+    package_data={'sgor_ros': ['py.typed']},
     data_files=[
         ('share/ament_index/resource_index/packages', ['resource/sgor_ros']),
         (SHARE, ['package.xml']),

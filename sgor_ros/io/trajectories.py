@@ -1,6 +1,7 @@
 """Trajectories in the formats of TUM and KITTI."""
 from collections.abc import Iterable
 from collections.abc import Sequence
+import io
 from itertools import pairwise
 from pathlib import Path
 
@@ -50,9 +51,8 @@ def read_kitti(path: str | Path) -> NDArray[np.float64]:
         No such file, lines of other than 12 numbers, or one that is neither a rotation and a
         translation nor all ``nan``.
     """
-    with readable(path):
-        rows = np.loadtxt(path, ndmin=2)
-    if rows.shape[1:] != (12,) or not len(rows):
+    rows = _rows(path)
+    if rows.shape[1:] != (12,):
         raise InputError(f'{path}: expected 12 numbers a line, got {rows.shape[-1]}')
     poses = np.tile(np.eye(4), (len(rows), 1, 1))
     poses[:, :3] = rows.reshape(-1, 3, 4)
@@ -87,8 +87,7 @@ def read_times(path: str | Path) -> list[int]:
         No such file, other than one number a line, or one that is no time or not later than that
         before it.
     """
-    with readable(path):
-        rows = np.loadtxt(path, ndmin=2)
+    rows = _rows(path)
     if rows.shape[1:] != (1,):
         raise InputError(f'{path}: expected one number a line, got {rows.shape[-1]}')
     seconds = rows[:, 0]
@@ -123,6 +122,15 @@ def read_calibration(path: str | Path) -> NDArray[np.float64]:
     if not _is_rigid(T[None])[0]:
         raise InputError(f'{path}: Tr is no rotation and translation: {_short(values)}')
     return T
+
+
+def _rows(path: str | Path) -> NDArray[np.float64]:
+    """Return the numbers of a file, those of a line in a row."""
+    with readable(path):
+        text = Path(path).read_text()
+        if not text.strip():
+            raise InputError(f'{path}: it is empty')
+        return np.loadtxt(io.StringIO(text), ndmin=2)
 
 
 def _is_rigid(T: NDArray[np.float64]) -> NDArray[np.bool_]:
