@@ -10,13 +10,15 @@ WORDS = 200
 
 
 @contextmanager
-def readable(what: Path | str) -> Iterator[None]:
+def readable(what: Path | str, advice: str = '') -> Iterator[None]:
     """Turn what a parser of broken bytes raises, which can be anything, into one error.
 
     Parameters
     ----------
     what : str or Path
         What is read, the subject of the message.
+    advice : str
+        What to do about it.
 
     Raises
     ------
@@ -27,6 +29,7 @@ def readable(what: Path | str) -> Iterator[None]:
     except InputError:
         raise
     except Exception as error:
-        said = ' '.join(str(error).split())
-        raise InputError(f'{what}: cannot be read: '
-                         f'{said[:WORDS] or type(error).__name__}') from error
+        said = ('it claims to be larger than the memory' if isinstance(error, MemoryError)
+                else str(error)[:WORDS] or type(error).__name__)
+        raise InputError(f'{what}: cannot be read: {said}'
+                         + (f'; {advice}' if advice else '')) from error
