@@ -32,6 +32,8 @@ from .solver.verification import verify
 from .trust.acceptance import compete
 from .trust.acceptance import judge_matches
 from .trust.acceptance import settle
+from .trust.hints import frame_hint
+from .trust.hints import scale_hint
 from .trust.rivals import Contest
 from .trust.view import View
 
@@ -88,8 +90,19 @@ def _register(source: SemanticScan | PreparedScan, target: SemanticScan | Prepar
                 *(f'target: {w}' for w in target.warnings))
     if any(labelled) and not all(labelled):
         warnings += (f'labels ignored: the {"target" if labelled[0] else "source"} has none',)
+    warnings += _hints(result, source, target, config)
     return replace(result, source_ground=source.ground, target_ground=target.ground,
                    warnings=warnings)
+
+
+def _hints(result: Registration, source: PreparedScan, target: PreparedScan,
+           config: SgorConfig) -> tuple[str, ...]:
+    """Return what may be wrong with the scans."""
+    hints = [scale_hint(result, config)]
+    if not result.success:
+        hints += [f'{side}: {hint}' for side, scan in (('source', source), ('target', target))
+                  if (hint := frame_hint(scan.scan.points, config))]
+    return tuple(filter(None, hints))
 
 
 def _attempts(config: SgorConfig, *, labelled: bool, level: bool) -> Iterator[SgorConfig]:
