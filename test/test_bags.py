@@ -1,4 +1,6 @@
 """Bags of others, and bags that are broken: read, or refused with what to do about it."""
+import sqlite3
+
 from conftest import write_bag
 import numpy as np
 import pytest
@@ -89,6 +91,18 @@ def test_a_count_in_the_metadata_that_is_none(mcap):
     metadata.write_text(text.replace('message_count: 3', 'message_count: three'))
     with pytest.raises(InputError, match='cannot be read: '):
         read_all(mcap.parent)
+
+
+def test_a_topic_that_is_no_name(tmp_path):
+    """A column of sqlite3 holds whatever is put in."""
+    store = get_typestore(Stores.ROS2_JAZZY)
+    with Writer(tmp_path / 'bag', version=9, storage_plugin=StoragePlugin.SQLITE3) as writer:
+        writer.add_connection('/points', CLOUD_TYPE, typestore=store)
+    path = next((tmp_path / 'bag').glob('*.db3'))
+    with sqlite3.connect(path) as database:
+        database.execute("UPDATE topics SET name = x'0102'")
+    with pytest.raises(InputError, match='is no name of a topic|cannot be read'):
+        read_all(path)
 
 
 @pytest.mark.parametrize(('plugin', 'suffix'), [

@@ -140,9 +140,11 @@ def test_times_are_times(tmp_path, times, says):
 
 
 @pytest.mark.parametrize(('row', 'says'), [
-    ('nan ' * 12, 'pose 1 is nan'), ('nan' + EYE[1:], 'pose 1 is no rotation'),
-    (EYE.replace('1', '0'), 'pose 1 is no rotation'), ('-' + EYE, 'pose 1 is no rotation'),
-    (EYE.replace('0 0 0 0', '0 1e300 0 0'), 'pose 1 is no rotation'),
+    ('nan ' * 12, 'the pose of scan 1 is not finite'),
+    ('nan' + EYE[1:], 'the pose of scan 1 is not finite'),
+    (EYE.replace('1', '0'), 'the pose of scan 1 is no rotation'),
+    ('-' + EYE, 'the pose of scan 1 is no rotation'),
+    (EYE.replace('0 0 0 0', '0 0 1e300 0'), 'the pose of scan 1 is no rotation'),
     (EYE + '\n1 2 3', 'cannot be read')])
 def test_poses_are_poses(tmp_path, row, says):
     (tmp_path / 'poses.txt').write_text(f'{EYE}\n{row}\n')

@@ -58,8 +58,9 @@ def read_kitti(path: str | Path) -> NDArray[np.float64]:
     poses[:, :3] = rows.reshape(-1, 3, 4)
     bad = np.flatnonzero(~(_is_rigid(poses) | np.isnan(rows).all(axis=1)))
     if bad.size:
-        raise InputError(f'{path}: pose {bad[0]} is no rotation and translation: '
-                         f'{_short(rows[bad[0]])}')
+        row = rows[bad[0]]
+        what = 'no rotation and translation' if np.isfinite(row).all() else 'not finite'
+        raise InputError(f'{path}: the pose of scan {bad[0]} is {what}: {_short(row)}')
     return poses
 
 
@@ -74,7 +75,7 @@ def read_poses(path: str | Path) -> NDArray[np.float64]:
     poses = read_kitti(path)
     missing = np.flatnonzero(np.isnan(poses[:, 0, 0]))
     if missing.size:
-        raise InputError(f'{path}: pose {missing[0]} is nan')
+        raise InputError(f'{path}: the pose of scan {missing[0]} is not finite')
     return poses
 
 
