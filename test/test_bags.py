@@ -101,7 +101,7 @@ def test_a_topic_that_is_no_name(tmp_path):
     path = next((tmp_path / 'bag').glob('*.db3'))
     with sqlite3.connect(path) as database:
         database.execute("UPDATE topics SET name = x'0102'")
-    with pytest.raises(InputError, match='is no name of a topic|cannot be read'):
+    with pytest.raises(InputError, match='is no name of a topic'):
         read_all(path)
 
 
