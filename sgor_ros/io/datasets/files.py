@@ -102,7 +102,6 @@ def read_times(path: Path, scans: Sequence[Path]) -> NDArray[np.int64]:
     bad = np.flatnonzero(~((seconds >= 0) & (seconds < MOST_SECONDS)))
     if bad.size:
         raise InputError(f'{path}: {seconds[bad[0]]} s for {scans[bad[0]].name} is no time')
-    # whole seconds apart, for a double has no digits for the nanoseconds of an epoch
     return increasing([round(value * 1e9) for value in seconds.tolist()], path, scans)
 
 
