@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
+from .. import visualize
 from ..core.common.settings import InputError
 from ..core.config import SgorConfig
 from ..core.scan.labels import label_convention
@@ -30,6 +31,7 @@ from ..tracker import Tracker
 from ..tracker import TrackerConfig
 from .options import add_params_file
 from .options import add_settings
+from .options import add_visualize
 from .options import configured
 from .options import parser
 from .options import read_parameters
@@ -54,21 +56,25 @@ def replay(arguments: Namespace) -> int:
     start = SgorConfig() if drive is None else SgorConfig(label_convention=drive.label_convention)
     tracker = Tracker(configured(start, arguments, parameters),
                       configured(TrackerConfig(), arguments, parameters))
+    if arguments.visualize is not None:
+        visualize.check(arguments.visualize)
     label_convention(tracker.config.label_convention)
     output: Path = arguments.output or Path('out') / arguments.bag_path.stem
     warnings = Warnings()
     rows: list[Row] = []
     broken: InputError | None = None
     with ExitStack() as stack:
-        source: BagReader | DriveReader = (BagReader(arguments.bag_path) if drive is None
-                                           else DriveReader(drive))
-        bag = stack.enter_context(source)
+        bag: BagReader | DriveReader = (
+            stack.enter_context(BagReader(arguments.bag_path)) if drive is None
+            else stack.enter_context(DriveReader(drive)))
         topic = arguments.topic or bag.find_topic(stream.label_field)
         clouds, expected = bag.clouds(topic), bag.cloud_topics()[topic]
         output.mkdir(parents=True, exist_ok=True)
         writer = stack.enter_context(BagWriter(output / 'bag')) if arguments.bag else None
         warm_up(tracker.config)
-        steps = Steps(tracker, stream, writer, warnings)
+        look = (None if arguments.visualize is None else stack.enter_context(
+            visualize.track_view(arguments.visualize, tracker.config)))
+        steps = Steps(tracker, stream, writer, warnings, look)
         try:
             for cloud in tqdm(clouds, total=expected, unit='scan', disable=None):
                 rows.append(steps.take(cloud))
@@ -100,6 +106,7 @@ def _parser() -> ArgumentParser:
                          help='for the results; default: out/ and the name of the bag')
     command.add_argument('--bag', action='store_true',
                          help='also write a bag with /pose, /odometry and /correspondences')
+    add_visualize(command)
     add_params_file(command)
     add_settings(command, 'clouds and frames', StreamConfig.settings())
     add_settings(command, 'tracker', TrackerConfig.settings())

@@ -180,9 +180,10 @@ def read_calibration(path: Path) -> Array:
 
 def check_rigid(path: Path, T: Array) -> None:
     """Refuse (N, 4, 4) matrices that are no turns and shifts, such as nan or all zero."""
-    turn = T[:, :3, :3]
+    finite = np.isfinite(T).all(axis=(1, 2))
+    turn = np.where(finite[:, None, None], T, 0)[:, :3, :3]
     off = np.abs(turn @ turn.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2))
-    good = (off < NOT_RIGID) & (np.linalg.det(turn) > 0) & np.isfinite(T).all(axis=(1, 2))
+    good = (off < NOT_RIGID) & (np.linalg.det(turn) > 0) & finite
     if not good.all():
         raise InputError(f'{path}: the pose of scan {np.flatnonzero(~good)[0]} is no rotation and '
                          'translation')
