@@ -53,6 +53,8 @@ setup(
         'benchmark': [*OPEN3D, 'kiss-icp', 'kiss_matcher'],
         # to run what docs/pose_graph.md shows
         'slam': ['gtsam>=4.3', 'g2opy'],
+        # --visualize; needs numpy 2, which the messages of an installed Jazzy do not take
+        'visualize': ['rerun-sdk>=0.41'],
         'test': ['pytest'],
         'dev': [
             'mypy',
