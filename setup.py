@@ -29,7 +29,8 @@ setup(
     data_files=[
         ('share/ament_index/resource_index/packages', ['resource/sgor_ros']),
         (SHARE, ['package.xml']),
-        (f'{SHARE}/config', glob('config/*.yaml') + glob('config/*.rviz')),
+        (f'{SHARE}/config', glob('config/*.yaml') + glob('config/*.rviz')
+         + glob('config/*.json')),
         (f'{SHARE}/config/labels', glob('config/labels/*.yaml')),
         (f'{SHARE}/launch', glob('launch/*.py')),
     ],

@@ -1,5 +1,7 @@
 """Scans on disk: each layout is seen from its path, and broken ones are refused by name."""
 import json
+from pathlib import Path
+import re
 import shutil
 
 from conftest import errors
@@ -364,3 +366,14 @@ def test_real_labels_of_rellis_are_all_known(data_folder):
     classes, _, unknown = label_convention('rellis').decode(labels)
     assert unknown == []
     assert (classes > 0).sum() > 60000
+
+
+def test_the_example_of_the_docs(street, tmp_path, capsys):
+    page = (Path(__file__).resolve().parents[1] / 'docs/data.md').read_text()
+    code, = re.findall(r'```python\n(.*?)```', page, re.DOTALL)
+    scope = {'path': write_scans(tmp_path / 'park', street[:2])}
+    exec(code, scope)
+    assert capsys.readouterr().out == 'park 2 semantickitti\n'
+    assert scope['tracked'].success
+    metres, _ = errors(scope['tracked'].T_odom_sensor, relative(street[0][2], scope['truth']))
+    assert metres < 0.1
