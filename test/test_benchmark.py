@@ -368,7 +368,7 @@ def test_solver_command(tmp_path):
 
 
 @pytest.mark.parametrize(('arguments', 'message'), [
-    (['pairs', '--data', 'nowhere'], 'nowhere: no folder velodyne'),
+    (['pairs', '--data', 'nowhere'], 'nowhere: no such file or folder'),
     (['pairs', '--data', '{data}', '--methods', 'icp'], '--methods icp: not one of sgor, paper'),
     (['pairs', '--data', '{data}', '--max-distance', '0.1'], 'no pairs within 0.1 m'),
     (['wrong', '--data', '{data}/sequences/01'], 'no wrong pairs'),
