@@ -11,6 +11,7 @@ from sgor_ros.core.config import SgorConfig
 from sgor_ros.evaluation import pairs as pairing
 from sgor_ros.evaluation import report
 from sgor_ros.evaluation import solver
+from sgor_ros.evaluation.ablation import PAPER_ROWS
 from sgor_ros.evaluation.metrics import THREE_SIGMA
 from sgor_ros.evaluation.pairs import Pair
 from sgor_ros.evaluation.rivals import Answer
@@ -305,13 +306,15 @@ def test_ablation_command(sequences_folder, tmp_path):
     rows = rows_of(out)
     names = [r['method'] for r in rows]
     assert len(set(names)) == len(names)
-    # all that the default does and the paper does not, but for mere sizes
+    # all that the default does and the paper does not
     default, paper = SgorConfig(), SgorConfig.paper()
     beyond = {item.name for item in SgorConfig.settings()
               if getattr(default, item.name) != getattr(paper, item.name)}
-    assert {name.split('=')[0] for name in names if '=' in name and 'paper' not in name
-            } == beyond - {'groups', 'group_size'}
-    assert sum(name.startswith('paper, ') for name in names) == 5    # its own ablations
+    assert {name.split('=')[0] for name in names if '=' in name} == beyond
+    assert sum(name.startswith('paper, row ') for name in names) == 5    # its own ablations
+    table = (out / 'table.md').read_text()
+    for row in PAPER_ROWS:
+        assert f'| {row.number}) {row.name} | {row.recall:.2f} % |' in table
     default = next(r for r in rows if r['method'] == 'default')
     assert default['within'] == 'True'
     # without the local refinement the answer is another

@@ -33,6 +33,8 @@ def benchmark_parser() -> ArgumentParser:
                              'random and evenly over data sets and distances')
     three = _add(commands, 'ablation', 'every mechanism off, one at a time')
     three.add_argument('--pairs', type=_positive, default=200, help='right pairs, likewise')
+    three.add_argument('--paper', action='store_true', help="only the rows of the paper's table "
+                       'and its other readings')
     for command in (one, two, three):
         command.add_argument('--max-distance', type=float, default=36.0, metavar='M',
                              help='between the sensors of a right pair')

@@ -23,6 +23,7 @@ from .descriptors import regional_labels
 from .descriptors import unit_rows
 from .features import Features
 from .ground import Ground
+from .ground import printed_ground
 from .ground import segment_ground
 from .labels import label_convention
 from .labels import LabelConvention
@@ -110,13 +111,16 @@ def _prepare(scan: SemanticScan, asked: SgorConfig, given: Given | None,
     with clock('surface'):
         local = _fixed_surface(points, labels, convention, config)
     with clock('ground'):
-        ground = segment_ground(cloud, convention.ground, config)
+        ground = (segment_ground(cloud, convention.ground, config) if config.robust_ground else
+                  printed_ground(cloud, points, labels, convention.ground, config))
         if ground is not None and config.correspondence_preprocessing:
             cloud = cloud[~ground.mask]
     with clock('votes'):
         neighbours = radius_neighbours(cloud.points, config.vote_radius)
         regional = regional_labels(cloud, neighbours, config.vote_radius)
         keep = ~np.isin(regional, _unmatched_classes(convention, config))
+        if config.correspondence_preprocessing and config.drop_ground_labels == 'point':
+            keep &= ~np.isin(cloud.labels, list(convention.ground))    # S_n of Eq. 4
         cloud, regional = cloud[keep], regional[keep]
     if given is None:
         features, directions = _describe(cloud, regional, config, clock)
@@ -186,7 +190,7 @@ def _unknown_in_words(ids: NDArray[np.int64], unknown: list[int], convention: st
 def _unmatched_classes(convention: LabelConvention, config: SgorConfig) -> list[int]:
     """Return the regional labels that take no part in matching."""
     ground = (convention.ground if config.correspondence_preprocessing
-              and config.drop_ground_labels else frozenset())
+              and config.drop_ground_labels == 'regional' else frozenset())
     return sorted(ground if config.moving_vote else ground | convention.movable)
 
 
