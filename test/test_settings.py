@@ -180,3 +180,10 @@ def test_paper_keeps_what_is_printed():
     assert paper.min_inliers == 0
     # exp(-d^2 / (2 sigma^2)) is cut where nothing is left of it
     assert math.exp(-paper.weight_cutoff**2 / 2) < 1e-7
+
+
+def test_an_error_is_one_line_that_a_terminal_shows():
+    """Names come out of files; an escape of a terminal among them is shown, not obeyed."""
+    error = InputError('field \x1b[2J\x00: broken\n    in line 2\n')
+    assert str(error) == r'field \x1b[2J\x00: broken in line 2'
+    assert str(InputError('Grüße, 5 °')) == 'Grüße, 5 °'
