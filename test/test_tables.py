@@ -289,8 +289,8 @@ def test_3dmatch_runs_to_its_end(tmp_path):
 @needs_data
 def test_refined_truth_is_kept(tmp_path):
     """ICP of real scans from poses that are 5 cm off; the second time nothing is read."""
-    from sgor_ros.evaluation.pairs import read_drives
-    drive, = read_drives(DATA / 'kitti/08')
+    from sgor_ros.io.datasets import open_drives
+    drive, = open_drives(DATA / 'kitti/08')
     T = drive.T_world_sensor
     task = strided([replace(drive, T_world_sensor=T[:len(drive.frames)])], [3]).tasks[0]
     off = replace(task, T_target_source=se3.compose(np.eye(3), np.array([0.05, 0.05, 0.0]))

@@ -17,7 +17,6 @@ from ..evaluation.ablation import PAPER_ROWS
 from ..evaluation.methods import Method
 from ..evaluation.methods import rivals
 from ..evaluation.methods import sgor
-from ..evaluation.pairs import Drive
 from ..evaluation.protocols import page
 from ..evaluation.protocols import studies
 from ..evaluation.protocols.drives import posed
@@ -34,6 +33,9 @@ from ..evaluation.protocols.task import Protocol
 from ..evaluation.protocols.task import Task
 from ..evaluation.protocols.truth import refined
 from ..evaluation.rivals import Answer
+from ..io.datasets import Drive
+from ..io.datasets import Frame
+from ..io.datasets import open_drives
 from . import options
 
 SPEED_M_S = 8.0
@@ -151,7 +153,7 @@ def _imported(name: str) -> Method:
 
 def _drives(arguments: Namespace) -> list[Drive]:
     if arguments.data is not None:
-        drives = [d for d in pairing.read_drives(arguments.data) if d.T_world_sensor is not None]
+        drives = [d for d in open_drives(arguments.data) if d.T_world_sensor is not None]
         if not drives:
             raise InputError(f'--data {arguments.data}: no drive with poses.txt in it')
         return drives
@@ -179,13 +181,13 @@ def _kitti_loops(arguments: Namespace) -> Protocol:
     return kitti_loops(arguments.list, _finder(arguments))
 
 
-def _finder(arguments: Namespace) -> Callable[[int, int], pairing.Frame | None]:
+def _finder(arguments: Namespace) -> Callable[[int, int], Frame | None]:
     """Return what finds scan i of a sequence: in a folder of its number."""
     if arguments.data is None:
         raise InputError('--list needs --data: the folder of the sequences')
     drives = {d.name.rpartition('/')[2]: {frame.name.rpartition('/')[2]: frame
                                           for frame in d.frames}
-              for d in pairing.read_drives(arguments.data)}
+              for d in open_drives(arguments.data)}
     return lambda sequence, scan: drives.get(f'{sequence:02d}', {}).get(f'{scan:06d}')
 
 

@@ -3,8 +3,8 @@ from collections.abc import Sequence
 
 from ...core.common import se3
 from ...core.config import SgorConfig
+from ...io.datasets import Drive
 from ..pairs import BAND_M
-from ..pairs import Drive
 from ..pairs import near_pairs
 from .kitti import INLIER_M
 from .task import EASY

@@ -16,8 +16,8 @@ from ...core.scan.labels import UNLABELLED
 from ...core.scan.preprocessing import preprocess
 from ...core.scan.scan import PreparedScan
 from ...core.scan.scan import SemanticScan
+from ...io.datasets import Frame
 from ..methods import Matches
-from ..pairs import Frame
 from ..pairs import random_labels
 from .task import Task
 

@@ -10,8 +10,8 @@ from ...core.common import se3
 from ...core.common.settings import InputError
 from ...core.config import SgorConfig
 from ...core.scan.scan import SemanticScan
+from ...io.datasets import Frame
 from ...io.scans import read_scan
-from ..pairs import Frame
 from .task import INDOOR
 from .task import Protocol
 from .task import Task

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from ...core.common import se3
 from ...core.common.settings import InputError
 from ...core.config import SgorConfig
-from ..pairs import Drive
-from ..pairs import Frame
+from ...io.datasets import Drive
+from ...io.datasets import Frame
 from .task import EASY
 from .task import HARD
 from .task import LOOPS

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.config import SgorConfig
-from ..pairs import Frame
+from ...io.datasets import Frame
 
 
 @dataclass(frozen=True, eq=False)
