@@ -74,7 +74,7 @@ def main() -> None:
     grid[1, 0].set_ylabel('another placement', fontsize=12)
     for colour, marker, label in ((TARGET, 's', 'target scan'), (SOURCE, 's', 'source scan'),
                                   ('white', 'o', 'where the two sensors stood'),
-                                  (STRANGE, 'o', 'hangs in space that the other sensor saw through')):
+                                  (STRANGE, 'o', 'hangs where the other sensor saw through')):
         grid[0, 0].plot([], [], marker, color=colour, label=label, ms=8,
                         mec='black' if colour == 'white' else colour)
     figure.legend(*grid[0, 0].get_legend_handles_labels(), loc='outside lower center', ncols=4,
