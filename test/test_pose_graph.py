@@ -15,9 +15,7 @@ from sgor_ros.io.messages import odometry_of
 from sgor_ros.io.messages import relative_pose
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
-ROOT = Path(__file__).resolve().parents[1]
-DOCS = ROOT / 'docs/pose_graph.md'
-EXAMPLES = sorted((ROOT / 'examples').glob('pose_graph_*.py'))
+EXAMPLES = sorted((Path(__file__).resolve().parents[1] / 'examples').glob('pose_graph_*.py'))
 SCAN_NS, REFERENCE_NS = 1_700_000_000_300_000_000, 1_700_000_000_000_000_000
 DRAWS = 4000
 # of the mean of so many values of chi squared with 6 degrees of freedom
@@ -25,10 +23,9 @@ SPREAD = np.sqrt(2 * 6 / DRAWS)
 
 
 def from_docs(name):
-    """Return the function of a name out of the example that the page shows."""
-    example, = (path for path in EXAMPLES if f':pyobject: {name}' in DOCS.read_text().split(
-        f'literalinclude}} ../examples/{path.name}')[-1].split('```')[0])
-    return runpy.run_path(str(example))[name]
+    """Return the function of a name out of the examples that the page shows."""
+    path, = (path for path in EXAMPLES if f'def {name}(' in path.read_text())
+    return runpy.run_path(str(path))[name]
 
 
 def bag_type(name):
