@@ -4,11 +4,11 @@ from pathlib import Path
 import subprocess
 import sys
 
+from conftest import errors
+from conftest import relative
 import numpy as np
 import pytest
 
-from conftest import errors
-from conftest import relative
 from sgor_ros.world import simulate
 
 EXAMPLES = Path(__file__).resolve().parents[1] / 'examples'
@@ -57,7 +57,7 @@ def test_own_features_are_what_is_matched():
 
 def test_the_table_of_five_classes_is_what_reads_the_labels():
     module = example('label_convention')
-    _, points, raw, _ = next(simulate(1, seed=0))
+    _, _, raw, _ = next(simulate(1, seed=0))
     assert set(np.unique(module.ours(raw))) == {0, 1, 2, 3, 4, 5}
 
 
