@@ -1,6 +1,6 @@
 """The colours of all pictures: eight that the colour-blind tell apart (Okabe and Ito)."""
 
-BLACK, GREY = '#111111', '#888888'
+BLACK, GREY = '#111111', '#999999'
 BLUE, SKY, GREEN, ORANGE = '#0072b2', '#56b4e9', '#009e73', '#e69f00'
 VERMILION, PINK, WINE = '#d55e00', '#cc79a7', '#882255'
 
