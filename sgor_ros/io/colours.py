@@ -11,7 +11,7 @@ RIGHT, WRONG, STRANGE = BLUE, ORANGE, WINE
 TRUTH, ESTIMATE, LIMIT, LOST, SURE = BLACK, VERMILION, GREY, WINE, BLUE
 
 SERIES = ((BLUE, 'o', '-'), (VERMILION, 's', '--'), (GREEN, '^', '-.'), (PINK, 'D', ':'),
-          (ORANGE, 'v', '-'), (SKY, 'P', '--'), (WINE, 'X', '-.'), (GREY, '*', ':'))
+          (ORANGE, 'v', '-'), (SKY, 'P', '--'), (WINE, 'X', '-.'), (BLACK, '*', ':'))
 """Colour, marker and line of the first, second and so on of several curves."""
 
 CLASSES = {
