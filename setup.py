@@ -73,7 +73,8 @@ setup(
         # where no ROS 2 Jazzy is installed: the same rclpy with Fast DDS, as wheels
         'ros': ['ros-jazzy-rclpy[fastrtps]', 'ros-jazzy-common-interfaces'],
         'open3d': OPEN3D,
-        'benchmark': [*OPEN3D, 'kiss-icp', 'kiss_matcher'],
+        # rivals, their matches from depth maps, and a cluster to run on
+        'benchmark': [*OPEN3D, 'kiss-icp', 'kiss_matcher', 'igraph', 'pillow', 'distributed'],
         # to run what docs/pose_graph.md shows
         'slam': ['gtsam>=4.3', 'g2opy'],
         # --visualize; needs numpy 2, which the messages of an installed Jazzy do not take
