@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from ..common.checks import as_numbers
 from ..common.checks import finite_points
 from ..common.later import Later
 from ..common.settings import InputError
@@ -24,35 +25,35 @@ from .descriptors import regional_labels
 from .descriptors import unit_rows
 from .features import Features
 from .ground import Ground
+from .ground import printed_ground
 from .ground import segment_ground
 from .labels import label_convention
 from .labels import LabelConvention
-from .labels import UNLABELLED
 from .neighbours import radius_neighbours
 from .scale import scale_of
 from .scale import STREET_VOXEL
+from .scan import as_scan
 from .scan import Given
 from .scan import PreparedScan
 from .scan import SemanticScan
 from .surface import Surface
 from .surface import surface
+from .usable import usable
 from .voxels import shift_of
 from .voxels import thin
 from .voxels import voxel_grid
 from .voxels import VoxelCloud
 
-# ids to name in a warning
-UNKNOWN_TOLD = 5
 
-
-def preprocess(scan: SemanticScan, config: SgorConfig | None = None, *,
+def preprocess(scan: SemanticScan | ArrayLike, config: SgorConfig | None = None, *,
                keypoints: ArrayLike | None = None, descriptors: ArrayLike | None = None,
                scale_before: float | None = None) -> PreparedScan:
     """Segment the ground and describe the rest of one scan, once for all its registrations.
 
     Parameters
     ----------
-    scan : SemanticScan
+    scan : SemanticScan or (N, 3) array
+        An array is points without labels, metres.
     config : SgorConfig, optional
         ``SgorConfig.outdoor()`` where none is given.
     keypoints : (V, 3) array, optional
@@ -69,12 +70,16 @@ def preprocess(scan: SemanticScan, config: SgorConfig | None = None, *,
     Raises
     ------
     InputError
-        Only one of keypoints and descriptors is given, or their lengths differ.
+        What is no scan or no configuration; only one of keypoints and descriptors is given, or
+        their lengths differ.
     """
-    config = config or SgorConfig()
+    config = SgorConfig.given(config)
+    semantic = as_scan(scan, 'scan')
+    if isinstance(semantic, PreparedScan):
+        raise InputError('scan: it has been preprocessed already')
     with cores(config.threads):
         given = None if keypoints is None and descriptors is None else (keypoints, descriptors)
-        return _prepare(scan, config, given, scale_before)
+        return _prepare(semantic, config, given, scale_before)
 
 
 def at_scale(prepared: PreparedScan, scale: float) -> PreparedScan:
@@ -103,7 +108,8 @@ def _prepare(scan: SemanticScan, asked: SgorConfig, given: Given | None,
     if len(cloud.points) > config.max_voxels:
         warnings.append(f'{len(cloud.points)} voxels thinned to {config.max_voxels}')
         cloud = cloud[thin(len(cloud.points), config.max_voxels)]
-    cloud, regional, directions, ground = _segmented(cloud, convention, config, clock)
+    cloud, regional, directions, ground = _segmented(cloud, points, labels, convention, config,
+                                                        clock)
     if given is None:
         features = Features(cloud.points, cloud.labels, regional, partial(
             _described, cloud.points, directions, config.descriptor_radius))
@@ -132,19 +138,20 @@ def _gridded(scan: SemanticScan, convention: LabelConvention, asked: SgorConfig,
     """Return settings of a scale, usable points, labels, warnings, voxels and range image."""
     config = asked.scaled(scale)
     with clock('voxel grid'):
-        points, labels, warnings = _usable(scan, convention, config)
+        points, labels, warnings = usable(scan, convention, config)
         cloud, nearest = at_once(
             config.threads, partial(voxel_grid, points, labels, config.voxel_size),
             partial(range_image, points))
     return config, points, labels, warnings, cloud, nearest
 
 
-def _segmented(cloud: VoxelCloud, convention: LabelConvention, config: SgorConfig,
-               clock: Stopwatch) -> tuple[VoxelCloud, NDArray[np.uint8], NDArray[np.float64],
-                                          Ground | None]:
+def _segmented(cloud: VoxelCloud, points: NDArray[np.float32], labels: NDArray[np.uint8],
+               convention: LabelConvention, config: SgorConfig, clock: Stopwatch
+               ) -> tuple[VoxelCloud, NDArray[np.uint8], NDArray[np.float64], Ground | None]:
     """Return the voxels that may be matched, their regional labels and normals; the ground."""
     with clock('ground'):
-        ground = segment_ground(cloud, convention.ground, config)
+        ground = (segment_ground(cloud, convention.ground, config) if config.robust_ground else
+                  printed_ground(cloud, points, labels, convention.ground, config))
         if ground is not None and config.correspondence_preprocessing:
             cloud = cloud[~ground.mask]
     with clock('neighbours'):
@@ -153,6 +160,8 @@ def _segmented(cloud: VoxelCloud, convention: LabelConvention, config: SgorConfi
     with clock('votes'):
         regional = regional_labels(cloud, neighbours, config.vote_radius)
         keep = ~np.isin(regional, _unmatched_classes(convention, config))
+        if config.correspondence_preprocessing and config.drop_ground_labels == 'point':
+            keep &= ~np.isin(cloud.labels, list(convention.ground))    # S_n of Eq. 4
     with clock('normals'):
         directions = normals(cloud.points, neighbours, config.normal_radius, keep)
     return cloud[keep], regional[keep], directions[keep], ground
@@ -170,43 +179,10 @@ def _fixed_surface(points: NDArray[np.float32], labels: NDArray[np.uint8],
     return surface(cloud.points[fixed], config.voxel_size)
 
 
-def _usable(scan: SemanticScan, convention: LabelConvention, config: SgorConfig
-            ) -> tuple[NDArray[np.float32], NDArray[np.uint8], list[str]]:
-    """Return points within range, their classes inside, and what was odd."""
-    squared = np.einsum('ij,ij->i', scan.points, scan.points)
-    keep = (squared >= config.min_range**2) & (squared <= config.max_range**2)
-    if scan.labels is None:
-        points = np.compress(keep, scan.points, axis=0)    # six times as fast as [keep]
-        return points, np.full(len(points), UNLABELLED, np.uint8), []
-    labels, fixed, unknown = convention.decode(scan.labels)
-    keep &= fixed
-    warnings = []
-    if unknown:
-        warnings.append(_unknown_in_words(scan.labels & convention.mask, unknown, convention.name))
-    labels = labels[keep]
-    if labels.any() and (labels == labels[0]).all():
-        warnings.append(f'every point is {convention.names.get(int(labels[0]), labels[0])}: '
-                        'treated as unlabelled')
-        labels[:] = UNLABELLED
-    return np.compress(keep, scan.points, axis=0), labels, warnings
-
-
-def _unknown_in_words(ids: NDArray[np.int64], unknown: list[int], convention: str) -> str:
-    """Return a warning about ids that a convention does not list; a wrong field has thousands."""
-    told = ', '.join(str(i) for i in unknown[:UNKNOWN_TOLD])
-    if len(unknown) > UNKNOWN_TOLD:
-        told += f', ... {len(unknown)} in all'
-    share = float(np.isin(ids, unknown).mean())
-    text = f'label ids [{told}] are not in convention {convention}: treated as unlabelled'
-    if share <= 0.5:
-        return text
-    return f'{text}; these are {share:.0%} of the points: is label_convention right?'
-
-
 def _unmatched_classes(convention: LabelConvention, config: SgorConfig) -> list[int]:
     """Return the regional labels that take no part in matching."""
     ground = (convention.ground if config.correspondence_preprocessing
-              and config.drop_ground_labels else frozenset())
+              and config.drop_ground_labels == 'regional' else frozenset())
     return sorted(ground if config.moving_vote else ground | convention.movable)
 
 
@@ -235,10 +211,7 @@ def _given(keypoints: ArrayLike | None, descriptors: ArrayLike | None, cloud: Vo
     if keypoints is None or descriptors is None:
         raise InputError('keypoints and descriptors: give both or none')
     points = finite_points(keypoints, 'keypoints')
-    try:
-        described = np.asarray(descriptors, np.float32)
-    except (TypeError, ValueError) as error:
-        raise InputError(f'descriptors: not an array of numbers: {error}') from error
+    described = as_numbers(descriptors, 'descriptors').astype(np.float32)
     if described.ndim != 2 or len(described) != len(points):
         raise InputError(f'descriptors: expected one row a keypoint, ({len(points)}, D), '
                          f'got shape {described.shape}')
