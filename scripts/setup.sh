@@ -85,5 +85,5 @@ if [ "${#pins[@]}" -eq 0 ]; then
     bash scripts/tf2_msgs.sh "$venv/bin/python" "$venv/tf2_msgs" ||
         say 'it could not be built (cmake and a C++ compiler?): the tests of /tf are skipped'
 fi
-"$venv/bin/python" -c 'import open3d, rclpy, sgor_ros, small_gicp'
+"$venv/bin/python" -c 'import open3d, rclpy, sgor_ros'
 say "ready: $venv/bin/python"

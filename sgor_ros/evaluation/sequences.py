@@ -79,7 +79,10 @@ def odometries(config: SgorConfig, say: Callable[[str], None], *, unlabelled: bo
         say("kiss_icp is not installed, so left out; pip install 'sgor_ros[benchmark]'")
     else:
         makers['KISS-ICP'] = lambda: _unlabelled(kiss_icp())
-    makers['small_gicp, scan to scan'] = lambda: _unlabelled(scan_to_scan(config.threads))
+    if find_spec('small_gicp') is None:
+        say("small_gicp is not installed, so left out; pip install 'sgor_ros[benchmark]'")
+    else:
+        makers['small_gicp, scan to scan'] = lambda: _unlabelled(scan_to_scan(config.threads))
     return makers
 
 

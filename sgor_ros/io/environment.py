@@ -4,7 +4,7 @@ import os
 from pathlib import Path
 import platform
 
-PACKAGES = ('sgor_ros', 'numpy', 'scipy', 'numba', 'small_gicp', 'rosbags')
+PACKAGES = ('sgor_ros', 'numpy', 'scipy', 'numba', 'rosbags')
 
 
 def describe_environment(packages: tuple[str, ...] = PACKAGES) -> dict[str, str | int]:
