@@ -332,6 +332,11 @@ def test_sequence_command(sequences_folder, tmp_path):
             assert [int(r['scan']) for r in own] == list(range(scans))
             assert float(own[-1]['off_the_truth_m']) < 0.1
     assert 'small_gicp, scan to scan' in {r['method'] for r in rows}
+    assert all(float(r['cpu_seconds']) > 0 for r in rows)
+    # the third of a drive is the first that can be predicted
+    for r in rows:
+        assert (r['confirmed'] == 'True') <= (int(r['scan']) > 1)
+    assert any(r['confirmed'] == 'True' for r in rows)
     # what the tracker claims of itself; the rivals claim nothing
     for r in rows:
         assert (r['state'] == '') is not r['method'].startswith('SGOR')

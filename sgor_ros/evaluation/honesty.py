@@ -32,6 +32,8 @@ class Said:
         One standard deviation of that, by the covariance: root of the sum over x, y and z.
     step_nees, pose_nees : float
         Squared normalised errors of the step to the reference, and of that pose.
+    confirmed : bool
+        Whether it was the prediction that the clouds confirmed, and SGOR did not run.
     """
 
     state: str
@@ -39,6 +41,7 @@ class Said:
     claimed_m: float
     step_nees: float
     pose_nees: float
+    confirmed: bool
 
     @property
     def metres_wrong(self) -> bool:
@@ -66,4 +69,4 @@ def _said(scan: TrackedScan, truth: dict[int, Array], origin: dict[int, Array]) 
         pose = squared_normalised_error(scan.T_odom_sensor, moved, scan.covariance)
         if scan.covariance is not None:
             claimed = float(np.sqrt(np.trace(scan.covariance[:3, :3])))
-    return Said(scan.state, error, claimed, step, pose)
+    return Said(scan.state, error, claimed, step, pose, scan.confirmed)

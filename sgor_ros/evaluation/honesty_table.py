@@ -11,7 +11,8 @@ from .report import markdown
 from .sequences import Track
 
 RULE = ('Tracked, degenerate, failed and lost: states of the tracker; degenerate are predicted '
-        'along some direction, failed and lost have no pose. Drift: where a scan got no pose, the '
+        'along some direction, failed and lost have no pose. '
+        'Confirmed: predicted, and SGOR not asked. Drift: where a scan got no pose, the '
         'last one stands. NEES: squared error over what the covariance claims, mean (6 where it '
         f'is right, less is cautious) and share up to {THREE_SIGMA:.1f} (chi-square of 6 '
         'dimensions, 99.73 %), of the step to the reference and of the pose since the start. '
@@ -23,8 +24,9 @@ _GIVEN_UP = (State.FAILED, State.LOST)
 def honesty_table(tracks: Sequence[Track]) -> str:
     """Return a line for each track of an odometry that says how sure it is."""
     return markdown(
-        ['drive: method', 'scans', 'tracked', 'degenerate', 'failed', 'lost', 'drift [%]',
-         'NEES of a step', 'NEES of a pose', 'largest error, claimed [m]', 'metres wrong'],
+        ['drive: method', 'scans', 'tracked', 'degenerate', 'failed', 'lost', 'confirmed',
+         'drift [%]', 'NEES of a step', 'NEES of a pose', 'largest error, claimed [m]',
+         'metres wrong'],
         [_line(track) for track in tracks if track.said])
 
 
@@ -37,6 +39,7 @@ def _line(track: Track) -> list[str]:
     with_pose = [scan for scan in said if np.isfinite(scan.error_m)]
     worst = max(with_pose, key=lambda scan: scan.error_m, default=None)
     return [f'{track.drive}: {track.method}', str(len(track.said)), *shares,
+            f'{np.mean([scan.confirmed for scan in said]):.0%}' if said else '-',
             f'{track.errors.drift.translation_percent:.2f}',
             _honesty([scan.step_nees for scan in said]),
             _honesty([scan.pose_nees for scan in said]),

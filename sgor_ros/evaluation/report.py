@@ -129,20 +129,22 @@ def sequence_table(tracks: Sequence[Track]) -> str:
             f'{track.lengths_m[0]:g}-{track.lengths_m[-1]:g}',
             f'{found.drift.translation_percent:.2f}', f'{found.drift.rotation_deg_per_m:.4f}',
             f'{100 * np.median(found.translation_m):.1f}', f'{np.median(found.rotation_deg):.3f}',
-            str(track.without_pose), times(track.seconds[SETTLED:])])
+            str(track.without_pose), times(track.seconds[SETTLED:]),
+            times(track.cpu_seconds[SETTLED:])])
     return markdown(['drive: method', 'scans', 'way [m]', 'stretches [m]', 'drift [%]',
                      'drift [deg/m]', 'TE of a step [cm]', 'RE of a step [deg]',
-                     'without a pose', 'time a scan [ms]'], lines)
+                     'without a pose', 'time a scan [ms]', 'CPU time a scan [ms]'], lines)
 
 
 def scan_records(tracks: Sequence[Track]) -> list[dict[str, Any]]:
     """Return a line a scan: error of the pose and time, and what the tracker said of it."""
     return [{'drive': track.drive, 'method': track.method, 'scan': scan,
              'off_the_truth_m': float(np.linalg.norm(estimate[:3, 3] - truth[:3, 3])),
-             'seconds': seconds,
+             'seconds': seconds, 'cpu_seconds': cpu,
              **(asdict(track.said[scan]) if track.said else dict.fromkeys(_SAID, ''))}
-            for track in tracks for scan, (estimate, truth, seconds) in enumerate(
-                zip(track.errors.estimate, track.truth, track.seconds, strict=True))]
+            for track in tracks for scan, (estimate, truth, seconds, cpu) in enumerate(
+                zip(track.errors.estimate, track.truth, track.seconds, track.cpu_seconds,
+                    strict=True))]
 
 
 def solver_table(rows: Sequence[Solved]) -> str:

@@ -1,6 +1,5 @@
 """Runs odometries over the same scans, scan by scan in turns."""
 from collections.abc import Callable
-from collections.abc import Iterable
 from collections.abc import Sequence
 from dataclasses import dataclass
 from dataclasses import replace
@@ -50,6 +49,8 @@ class Track:
         Stretches that the drift was measured over.
     without_pose : int
     seconds : (N,) float64
+    cpu_seconds : (N,) float64
+        Of all threads together: what the clock shows depends on who else wants the cores.
     said : list of Said
         For each scan; empty where the odometry says nothing but poses.
     """
@@ -61,6 +62,7 @@ class Track:
     lengths_m: tuple[float, ...]
     without_pose: int
     seconds: Array
+    cpu_seconds: Array
     said: list[Said]
 
 
@@ -119,21 +121,21 @@ def run_drive(drive: Drive, makers: dict[str, Callable[[], Step]], config: SgorC
             step(frame.read())
     odometry = {name: make() for name, make in makers.items()}
     poses: dict[str, list[Array | None]] = {name: [] for name in makers}
-    seconds: dict[str, list[float]] = {name: [] for name in makers}
+    seconds: dict[str, list[tuple[float, float]]] = {name: [] for name in makers}
     rng = np.random.default_rng(0)
     for frame in tqdm(drive.frames, drive.name, unit='scan', disable=None):
         scan = frame.read()
         for name in rng.permutation(list(makers)):
-            start = time.perf_counter()
+            start, cpu_start = time.perf_counter(), time.process_time()
             T = odometry[name](scan)
-            seconds[name].append(time.perf_counter() - start)
+            seconds[name].append((time.perf_counter() - start, time.process_time() - cpu_start))
             poses[name].append(T)
     return [_track(name, drive.name, poses[name], truth, seconds[name], odometry[name])
             for name in makers]
 
 
 def _track(method: str, drive: str, poses: Sequence[Array | None], truth: Array,
-           seconds: Iterable[float], odometry: Step) -> Track:
+           seconds: Sequence[tuple[float, float]], odometry: Step) -> Track:
     held: list[Array] = []
     for T in poses:
         held.append(T if T is not None else held[-1] if held else np.eye(4))
@@ -141,6 +143,7 @@ def _track(method: str, drive: str, poses: Sequence[Array | None], truth: Array,
     # those of the KITTI benchmark, shrunk to a drive that is shorter than theirs
     shrink = min(1.0, way / 1000)
     lengths = tuple(round(length * shrink, 2) for length in KITTI_LENGTHS_M)
+    clock, processor = np.array(seconds).T
     return Track(method, drive, track_errors(np.array(held), truth, lengths), truth, lengths,
-                 sum(T is None for T in poses), np.array(list(seconds)),
+                 sum(T is None for T in poses), clock, processor,
                  what_was_said(odometry.tracked, truth) if isinstance(odometry, _Sgor) else [])

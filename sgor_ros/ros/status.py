@@ -78,6 +78,7 @@ def details(tracked: TrackedScan) -> dict[str, str]:
     shown = {'state': tracked.state.value, 'track': str(tracked.track_id),
              'reason': tracked.reason}
     if step is not None:
+        shown['found by'] = 'a confirmed prediction' if tracked.confirmed else 'SGOR'
         shown['confidence'] = f'{step.confidence:.3f}'
         shown['inliers'] = str(int(step.inliers.sum()))
         shown['correspondences'] = str(len(step.inliers))
