@@ -1,5 +1,4 @@
 """`sgor_kitti_to_bag`: a sequence of SemanticKITTI becomes a bag of labelled clouds."""
-from argparse import ArgumentParser
 from argparse import Namespace
 from pathlib import Path
 import sys
@@ -15,13 +14,16 @@ from ..io.messages import odometry_of
 from ..io.messages import point_cloud2
 from ..io.scans import read_scan
 from ..io.trajectories import read_kitti
-from .options import parser
-from .options import run
+from .frame import OK
+from .frame import Parser
+from .frame import run
 
 CLOUD_TOPIC = '/points'
 TRUTH_TOPIC = '/ground_truth'
 LIDAR_FRAME = 'lidar'
 TRUTH_FRAME = 'odom'
+# of rotations in text files
+ROUNDING = 1e-2
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -49,14 +51,19 @@ def convert(arguments: Namespace) -> int:
                                                    LIDAR_FRAME), stamp_ns)
     print(f'{arguments.out}: {len(scans)} clouds on {CLOUD_TOPIC}'
           + (f', poses on {TRUTH_TOPIC}' if poses is not None else ', no poses'))
-    return 0
+    return OK
 
 
-def _parser() -> ArgumentParser:
-    command = parser('Write a sequence in the layout of SemanticKITTI (velodyne/, labels/, '
-                     'times.txt; calib.txt and poses.txt where there are any) to an mcap bag.')
+def _parser() -> Parser:
+    command = Parser(
+        'sgor_kitti_to_bag', 'SEQUENCE OUT [options]', 'Write a sequence in the layout of '
+        'SemanticKITTI (velodyne/, labels/, times.txt; calib.txt and poses.txt where there are '
+        'any) to an mcap bag.',
+        ('sgor_kitti_to_bag sequences/08 bags/08',
+         'sgor_kitti_to_bag sequences/08 bags/08_predicted --labels predicted_labels'))
     command.add_argument('sequence', type=Path, help='folder of the sequence, such as .../08')
-    command.add_argument('out', type=Path, help='folder of the bag; must not exist')
+    command.add_argument('out', type=Path, help='folder of the bag, must not exist; it is '
+                         'there when it is complete')
     command.add_argument('--labels', default='labels', metavar='FOLDER',
                          help='folder in the sequence with a .label for each scan: labels, '
                          'predicted_labels')
@@ -95,8 +102,18 @@ def _stamps_ns(path: Path, rows: list[int]) -> list[int]:
         seconds = np.loadtxt(path, ndmin=1)
     except (OSError, ValueError) as error:
         raise InputError(f'{path}: no times: {error}') from error
+    if seconds.ndim != 1:
+        raise InputError(f'{path}: expected one time a line, got {seconds.shape[1]} numbers')
     _check_length(path, len(seconds), rows)
-    return [round(s * 1e9) for s in seconds[rows].tolist()]
+    used = seconds[rows]
+    # stamps of ROS are seconds in 32 bits; nan is neither
+    if not ((used >= 0) & (used < 2**31)).all():
+        raise InputError(f'{path}: times must be seconds from 0 to 2^31, got '
+                         f'{used[~((used >= 0) & (used < 2**31))][0]:g}')
+    if (np.diff(used) <= 0).any():
+        raise InputError(f'{path}: times must increase; that of scan '
+                         f'{rows[int(np.argmax(np.diff(used) <= 0)) + 1]} does not')
+    return [round(s * 1e9) for s in used.tolist()]
 
 
 def _lidar_poses(folder: Path, rows: list[int]) -> NDArray[np.float64] | None:
@@ -106,6 +123,8 @@ def _lidar_poses(folder: Path, rows: list[int]) -> NDArray[np.float64] | None:
         return None
     cameras = read_kitti(path)
     _check_length(path, len(cameras), rows)
+    for row in rows:
+        _check_rigid(cameras[row], f'{path}: the pose of scan {row}')
     T_camera_lidar = _calibration(folder / 'calib.txt')
     lidars = se3.inverse(T_camera_lidar) @ cameras[rows] @ T_camera_lidar
     return se3.inverse(lidars[0]) @ lidars
@@ -124,7 +143,17 @@ def _calibration(path: Path) -> NDArray[np.float64]:
     except (OSError, KeyError, ValueError) as error:
         raise InputError(f'{path}: no row Tr of 12 numbers, which the poses need: '
                          f'{error}') from error
-    return se3.compose(values[:, :3], values[:, 3])
+    T_camera_lidar = se3.compose(values[:, :3], values[:, 3])
+    _check_rigid(T_camera_lidar, f'{path}: Tr')
+    return T_camera_lidar
+
+
+def _check_rigid(T: NDArray[np.float64], what: str) -> None:
+    R = T[:3, :3]
+    if not np.isfinite(T).all():
+        raise InputError(f'{what} is not finite')
+    if not np.allclose(R @ R.T, np.eye(3), atol=ROUNDING) or np.linalg.det(R) < 0:
+        raise InputError(f'{what} is no rotation and translation')
 
 
 if __name__ == '__main__':

@@ -1,10 +1,8 @@
-"""Command line options derived from the settings, and the frame around every command."""
-from argparse import ArgumentDefaultsHelpFormatter
+"""Command line options derived from the settings."""
 from argparse import ArgumentParser
 from argparse import BooleanOptionalAction
 from argparse import Namespace
 from argparse import SUPPRESS
-from collections.abc import Callable
 from collections.abc import Iterable
 from pathlib import Path
 import sys
@@ -15,25 +13,15 @@ import yaml
 from ..core.common.settings import InputError
 from ..core.common.settings import Setting
 from ..core.common.settings import Settings
+from ..core.config import SgorConfig
 
-REFUSED = 2
-INTERRUPTED = 130
-
-
-def parser(description: str) -> ArgumentParser:
-    """Return a parser whose help shows the defaults."""
-    return ArgumentParser(description=description, formatter_class=ArgumentDefaultsHelpFormatter)
+PRESETS = {'outdoor': SgorConfig.outdoor, 'indoor': SgorConfig.indoor, 'paper': SgorConfig.paper}
 
 
-def run(command: Callable[[Namespace], int], arguments: Namespace) -> int:
-    """Run a command and return its exit code; what it refuses is told in one line."""
-    try:
-        return command(arguments)
-    except (InputError, OSError) as error:
-        print(f'error: {error}', file=sys.stderr)
-        return REFUSED
-    except KeyboardInterrupt:
-        return INTERRUPTED
+def add_preset(to: ArgumentParser) -> None:
+    """Add the option for the settings to start from."""
+    to.add_argument('--preset', choices=list(PRESETS), default='outdoor',
+                    help='settings of the registration to start from')
 
 
 def add_settings(to: ArgumentParser, title: str, settings: Iterable[Setting]) -> None:
@@ -91,12 +79,13 @@ def read_parameters(arguments: Namespace, known: Iterable[Setting]) -> dict[str,
         content = yaml.safe_load(path.read_text())
         nodes = [node['ros__parameters'] for node in content.values()]
         parameters = {name: value for node in nodes for name, value in node.items()}
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+    # a date that is none is a ValueError, as is text that is not UTF-8
+    except (OSError, ValueError, RecursionError, yaml.YAMLError) as error:
         raise InputError(f'--params-file {path}: cannot be read: {error}') from error
     except (AttributeError, KeyError, TypeError) as error:
         raise InputError(f'--params-file {path}: expected "/**: ros__parameters:" and settings '
                          'below it') from error
-    unknown = sorted(parameters.keys() - {item.name for item in known})
+    unknown = sorted(map(str, parameters.keys() - {item.name for item in known}))
     if unknown:
         print(f'warning: {path}: no settings of this command, so ignored: {", ".join(unknown)}',
               file=sys.stderr)

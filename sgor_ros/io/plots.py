@@ -12,8 +12,11 @@ from ..core.common.settings import InputError
 from ..core.result import Registration
 from ..core.scan.ground import Ground
 from ..core.scan.scan import SemanticScan
+from .writing import new_file
 
 Array = NDArray[np.float64]
+
+PICTURES = ('.png', '.pdf', '.svg')
 
 BLUE, ORANGE, GREEN, RED = '#2f6db3', '#e08a1e', '#2a9d5c', '#d1495b'
 # what the eye still tells apart in a picture of this size
@@ -33,7 +36,7 @@ def plot_registration(path: str | Path, title: str, source: SemanticScan, target
     Parameters
     ----------
     path : str or Path
-        PNG to write.
+        Picture to write; its ending is one of `PICTURES`.
     title : str
     source, target : SemanticScan
     result : Registration
@@ -75,13 +78,14 @@ def new_figure(width: float, height: float,
 
 
 def save(figure: Any, path: str | Path) -> None:
-    """Give the axes of a figure their looks and write it as PNG."""
+    """Give the axes of a figure their looks and write it."""
     for axes in figure.axes:
         axes.grid(True, color='#e3e6ea', lw=0.6)
         axes.set_axisbelow(True)
         axes.spines[['top', 'right']].set_visible(False)
         axes.title.set_fontsize(10)
-    figure.savefig(path, dpi=130, bbox_inches='tight', pad_inches=0.15)
+    with new_file(path) as place:
+        figure.savefig(place, dpi=130, bbox_inches='tight', pad_inches=0.15)
 
 
 def _on_ground(points: NDArray[Any], ground: Ground | None) -> NDArray[np.bool_]:

@@ -13,6 +13,9 @@ os.environ.setdefault('OMP_WAIT_POLICY', 'passive')
 import numba
 from threadpoolctl import ThreadpoolController
 
+from .compiling import tell_of_compiling
+
+tell_of_compiling()
 # its names are made as it is loaded, unseen by type checkers
 _config: Any = numba.config
 # OpenMP takes calls from several threads; numba's own pool aborts, an old TBB only warns
