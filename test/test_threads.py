@@ -1,15 +1,19 @@
 """The setting `threads` is kept: compiled loops, GICP and BLAS."""
+from concurrent.futures import ThreadPoolExecutor
+import threading
 import time
 
-import numba
 import numpy as np
+import pytest
 from threadpoolctl import threadpool_info
 
 from sgor_ros import preprocess
 from sgor_ros import register
 from sgor_ros import SemanticScan
 from sgor_ros import SgorConfig
+from sgor_ros.core.common import threads
 from sgor_ros.core.common.threads import cores
+from sgor_ros.core.common.threads import shared
 from sgor_ros.core.warmup import warm_up
 
 
@@ -18,13 +22,55 @@ def blas_threads():
             if pool['user_api'] == 'blas' and 'numpy' in pool['filepath']]
 
 
-def test_cores_holds_numba_and_blas_and_gives_them_back():
+def takers(count):
+    """Return the threads that took pieces of `count`, and how often each index was taken."""
+    found, taken = set(), np.zeros(count, int)
+
+    def kernel(first, last):
+        found.add(threading.get_ident())
+        taken[first:last] += 1
+        time.sleep(0.002)
+    shared(kernel, count)
+    return found, taken
+
+
+def test_cores_holds_loops_and_blas_and_gives_them_back(monkeypatch):
     """Within: `count` for the loops, one for BLAS; afterwards what the caller had."""
-    numba_before, blas_before = numba.get_num_threads(), blas_threads()
+    monkeypatch.setattr(threads, '_CORES', 4)
+    blas_before = blas_threads()
     with cores(1):
-        assert numba.get_num_threads() == 1
+        assert takers(100)[0] == {threading.get_ident()}
         assert set(blas_threads()) <= {1}
-    assert (numba.get_num_threads(), blas_threads()) == (numba_before, blas_before)
+        with cores(3):
+            assert 1 < len(takers(100)[0]) <= 3
+        assert takers(100)[0] == {threading.get_ident()}
+    assert len(takers(100)[0]) > 1
+    assert blas_threads() == blas_before
+
+
+@pytest.mark.parametrize('count', [0, 1, 2, 3, 17, 1000])
+def test_shared_work_is_done_once(count):
+    """Every index belongs to one piece, whatever the number of pieces."""
+    assert np.all(takers(count)[1] == 1)
+
+
+def test_an_error_in_a_piece_reaches_the_caller():
+    """From whichever thread it comes; the others are none the worse for it."""
+    def kernel(first, last):
+        time.sleep(0.002)
+        if last == 1000:
+            raise MemoryError('in a piece')
+    for _ in range(20):
+        with pytest.raises(MemoryError, match='in a piece'):
+            shared(kernel, 1000)
+    assert np.all(takers(1000)[1] == 1)
+
+
+def test_threads_that_share_at_the_same_time():
+    """More callers than the pool has threads: nobody waits for ever, nothing is left out."""
+    with ThreadPoolExecutor(8) as callers:
+        for _, taken in callers.map(lambda _: takers(50), range(64)):
+            assert np.all(taken == 1)
 
 
 def test_one_thread_is_one_thread():

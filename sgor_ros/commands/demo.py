@@ -14,6 +14,7 @@ from rosbags.typesys import Stores
 from tqdm import tqdm
 
 from ..core.common.settings import InputError
+from ..core.config import SgorConfig
 from ..evaluation.track import track_errors
 from ..evaluation.track import TrackErrors
 from ..evaluation.track_plots import plot_against_truth
@@ -22,6 +23,12 @@ from ..io.bags import BagReader
 from ..io.bags import CLOUD_TYPE
 from ..io.messages import matrix_of
 from ..io.messages import stamp_ns_of
+from .frame import FAILED
+from .frame import OK
+from .frame import Parser
+from .frame import run
+from .recorded_drive import Recorded
+from .recorded_drive import recorded_drive
 from .world_bag import STREET
 from .world_bag import WorldMap
 from .world_bag import write_world_bag
@@ -43,25 +50,31 @@ LAST_ANSWER_S = 60.0
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run the demo; return 0 where all went well, 1 where not, 2 on unusable input."""
-    options = _parse(arguments)
+    """Run the command and return its exit code."""
+    return run(play, _parse(arguments))
+
+
+def play(options: argparse.Namespace) -> int:
+    """Run the demo; 1 where the node did badly."""
     try:
         return _run(options)
-    except InputError as error:
-        print(f'error: {error}', file=sys.stderr)
-        return 2
     except TimeoutError as error:
         return _fail(f'{error}; see {options.out}/node.log')
 
 
 def _parse(arguments: list[str] | None) -> argparse.Namespace:
-    parser = argparse.ArgumentParser(
-        prog='sgor_demo', description='Write a labelled bag of the built-in world, play '
-        'it to sgor_node over DDS in real time, and compare what the node publishes with the '
-        'ground truth.', formatter_class=argparse.ArgumentDefaultsHelpFormatter)
+    parser = Parser(
+        'sgor_demo', '[options]', 'Write a labelled bag of the built-in world, or read a recorded '
+        'drive, play it to sgor_node over DDS in real time, and compare what the node publishes '
+        'with the ground truth.',
+        ('sgor_demo', 'sgor_demo --place courtyard --scans 300',
+         'sgor_demo --data sequences/08 --scans 500'),
+        'done; a slow machine that leaves scans out is told so',
+        'the node ended, was silent, failed often, or drifted by more than '
+        f'{WORST_DRIFT_PERCENT:g} %')
     parser.add_argument('--out', type=Path, default=Path('out/demo'),
-                        help='folder for the bag, the pictures and the log; an older bag there '
-                        'is replaced')
+                        help='folder for the bag, the pictures and the log; those of an older demo '
+                        'are replaced')
     parser.add_argument('--scans', type=int, default=120,
                         help=f'scans to play; the bag has {BAG_SCANS} at most, more of them are '
                         'that drive forth and back')
@@ -69,6 +82,8 @@ def _parse(arguments: list[str] | None) -> argparse.Namespace:
     parser.add_argument('--seed', type=int, default=0, help='chooses the place and the noise')
     parser.add_argument('--place', default=STREET, metavar='KIND', help='or tunnel, corridor, '
                         'facade, garage_half_full, ...: a wrong one lists them all')
+    parser.add_argument('--data', type=Path, metavar='FOLDER', help='play this recorded drive '
+                        'instead of the built-in world: velodyne/*.bin and poses.txt, the truth')
     options = parser.parse_args(arguments)
     if options.scans < 2:
         parser.error(f'--scans {options.scans}: at least 2')
@@ -84,26 +99,30 @@ def _run(options: argparse.Namespace) -> int:
         from ..ros.player import NodeProcess
         from ..ros.player import Player
     except ImportError as error:
-        raise InputError(f'no ROS 2 here ({error}): source /opt/ros/jazzy/setup.bash, or '
-                         "pip install 'sgor_ros[ros]'") from error
+        raise InputError(f'no ROS 2 here ({error}): source /opt/ros/jazzy/setup.bash, or pip '
+                         "install 'ros-jazzy-rclpy[fastrtps]' ros-jazzy-common-interfaces"
+                         ) from error
     out: Path = options.out
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f'--out {out}: {error.strerror}') from error
     _say('starting sgor_node; the first start on a machine compiles, for a minute or two')
-    with closing(Domain()) as domain, NodeProcess(domain, out / 'node.log') as node:
-        drive, world = write_world_bag(out / 'bag', min(options.scans, BAG_SCANS), options.seed,
-                                       options.place)
-        with BagReader(out / 'bag') as reader:
-            clouds = [cloud.read()[2] for cloud in reader.clouds(reader.find_topic('label'))]
+    most = min(options.scans, BAG_SCANS)
+    recorded = recorded_drive(options.data, most) if options.data else None
+    convention = (recorded or SgorConfig()).label_convention
+    with closing(Domain()) as domain, NodeProcess(
+            domain, out / 'node.log', '-p', f'label_convention:={convention}') as node:
+        # while the node starts
+        recorded = recorded or _built_in(options, most)
+        drive = recorded.truth
         scans = list(forth_and_back(list(drive), options.scans))
         truth = {stamp_ns: drive[original] for original, stamp_ns in scans}
         with Player(domain) as player:
             player.wait_for_node(node.alive)
             _say(f'sgor_node is ready; playing {len(scans)} scans at {options.rate:g} Hz')
             memory = [node.memory_mb()]
-            stream = _restamped(clouds, list(drive), scans)
+            stream = _restamped(recorded.clouds, list(drive), scans)
             player.play(tqdm(stream, 'playing', len(scans), unit='scan', disable=None),
                         1 / options.rate, node.alive)
             last = scans[-1][1]
@@ -115,7 +134,15 @@ def _run(options: argparse.Namespace) -> int:
         code = node.stop()
     if not alive or code:
         return _fail(f'sgor_node ended with code {code}; see {node.log}')
-    return _compare(player, truth, world, memory, options)
+    return _compare(player, truth, recorded.world, memory, options)
+
+
+def _built_in(options: argparse.Namespace, scans: int) -> Recorded:
+    """Drive through the built-in world and read what the bag has of it."""
+    truth, world = write_world_bag(options.out / 'bag', scans, options.seed, options.place)
+    with BagReader(options.out / 'bag') as reader:
+        clouds = [cloud.read()[2] for cloud in reader.clouds(reader.find_topic('label'))]
+    return Recorded(truth, clouds, world, SgorConfig().label_convention)
 
 
 def forth_and_back(stamps_ns: list[int], count: int) -> Iterator[tuple[int, int]]:
@@ -171,14 +198,15 @@ def _compare(player: 'Player', truth: dict[int, Array], world: WorldMap, memory_
         _say(slowness(len(answered), len(sent), seconds, options.rate))
     plot_against_truth(out / 'trajectory.png', errors, np.array(list(truth.values())), world)
     plot_errors(out / 'errors.png', errors, np.array(answered), seconds, 1 / options.rate)
-    _say(f'pictures: {out}/trajectory.png, {out}/errors.png; bag: {out}/bag')
+    _say(f'pictures: {out}/trajectory.png, {out}/errors.png'
+         + ('' if options.data else f'; bag: {out}/bag'))
     processed, failed = int(counts['processed']), int(counts['failed'])
     if processed < LEAST_SHARE * (processed + failed):
         return _fail(f'{failed} of {processed + failed} registrations failed; '
                      f'see {out}/node.log')
     if errors.drift.stretches and not errors.drift.translation_percent < WORST_DRIFT_PERCENT:
         return _fail(f'the drift is above {WORST_DRIFT_PERCENT} %')
-    return 0
+    return OK
 
 
 def slowness(answered: int, sent: int, seconds: Array, rate: float) -> str:
@@ -231,7 +259,7 @@ def _say(message: str) -> None:
 
 def _fail(message: str) -> int:
     print(f'error: {message}', file=sys.stderr)
-    return 1
+    return FAILED
 
 
 if __name__ == '__main__':

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from ..common.checks import as_labels
 from ..common.checks import finite_points
 from ..common.settings import InputError
+from ..common.threads import shared
 from ..config import SgorConfig
 from ..scan.context import OCTAVES
 from ..scan.descriptors import regional_labels
@@ -114,7 +115,9 @@ def match(source: Features, target: Features, config: SgorConfig) -> Corresponde
             order, first, last = _runs(source[rows], target, by_label, config)
             asked = thin(len(rows), _affordable(first, last))
             rows, first, last = rows[asked], first[asked], last[asked]
-            found = _nearest_in_runs(described[rows], candidates[order], first, last)
+            found = np.empty(len(rows), np.int64)
+            shared(_nearest_in_runs, len(rows), described[rows], candidates[order], first, last,
+                   found)
             nearest[rows[found >= 0]] = order[found[found >= 0]]
     found = np.flatnonzero(nearest >= 0)
     s, t = source[found], target[nearest[found]]
@@ -182,11 +185,11 @@ def _voted(points: NDArray[np.float64], ids: NDArray[np.int64], convention: Labe
     return labels, regional_labels(cloud, neighbours, config.vote_radius)
 
 
-@numba.njit(cache=True, nogil=True, parallel=True, fastmath=True)
-def _nearest_in_runs(source, target, first, last):  # type: ignore[no-untyped-def]
-    """Return for each source row the nearest target row of its runs, -1 for empty ones."""
-    nearest = np.empty(len(source), np.int64)
-    for i in numba.prange(len(source)):
+@numba.njit(cache=True, nogil=True, fastmath=True)
+def _nearest_in_runs(begin, end, source, target, first, last,  # type: ignore[no-untyped-def]
+                     nearest):
+    """Write for each source row the nearest target row of its runs, -1 for empty ones."""
+    for i in range(np.uint64(begin), np.uint64(end)):
         best = np.float32(np.inf)
         at = -1
         for run in range(first.shape[1]):
@@ -199,4 +202,3 @@ def _nearest_in_runs(source, target, first, last):  # type: ignore[no-untyped-de
                     best = distance
                     at = j
         nearest[i] = at
-    return nearest

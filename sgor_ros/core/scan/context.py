@@ -10,6 +10,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.threads import shared
 from ..config import SgorConfig
 from .descriptors import unit_rows
 from .ground import Ground
@@ -69,26 +70,32 @@ def semantic_context(points: NDArray[np.float64], labels: NDArray[np.uint8], gro
         taps = np.arange(-math.ceil(TRUNCATE * sigma), math.ceil(TRUNCATE * sigma) + 1)
         kernel = np.exp(-0.5 * (taps / sigma)**2).astype(np.float32)
         kernel *= np.sqrt(sigma) / kernel.sum()    # far scales are thinner: keep their say
-        context[:, columns, octave] = _blur(places // shape[1], places % shape[1], occupied,
-                                            kernel, shape[0], shape[1])
+        rows = np.zeros((*shape, len(columns)), np.float32)
+        _blur_rows(places // shape[1], places % shape[1], occupied, kernel, rows)
+        blurred = np.zeros(occupied.shape, np.float32)
+        shared(_blur_columns, len(places), places // shape[1], places % shape[1], rows, kernel,
+               blurred)
+        context[:, columns, octave] = blurred
     flat = np.sqrt(context.reshape(len(places), OCTAVES * (1 + len(classes))))
     return np.hstack((unit_rows(flat[:, :OCTAVES]), unit_rows(flat[:, OCTAVES:])))[of_point]
 
 
-@numba.njit(cache=True, nogil=True, parallel=True, fastmath=True)
-def _blur(x, y, occupied, kernel, nx, ny):  # type: ignore[no-untyped-def]
-    """Blur maps that are given, and wanted, at some places only: (P, C)."""
-    n_places, n_classes = occupied.shape
+@numba.njit(cache=True, nogil=True, fastmath=True)
+def _blur_rows(x, y, occupied, kernel, rows):  # type: ignore[no-untyped-def]
+    """Blur maps of occupied places along the first axis: (nx, ny, C)."""
     half = len(kernel) // 2
-    rows = np.zeros((nx, ny, n_classes), np.float32)
-    for i in range(n_places):
-        for c in range(n_classes):
+    for i in range(len(x)):
+        for c in range(occupied.shape[1]):
             if occupied[i, c]:
                 for t in range(len(kernel)):
                     rows[x[i] + t - half, y[i], c] += kernel[t]
-    out = np.zeros((n_places, n_classes), np.float32)
-    for i in numba.prange(n_places):
+
+
+@numba.njit(cache=True, nogil=True, fastmath=True)
+def _blur_columns(first, last, x, y, rows, kernel, out):  # type: ignore[no-untyped-def]
+    """Blur maps along the second axis, where they are wanted: (P, C)."""
+    half = len(kernel) // 2
+    for i in range(first, last):
         for t in range(len(kernel)):
-            for c in range(n_classes):
+            for c in range(out.shape[1]):
                 out[i, c] += kernel[t] * rows[x[i], y[i] + t - half, c]
-    return out

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common.angles import atan2
+from ..common.threads import shared
 from .neighbours import Neighbours
 from .voxels import VoxelCloud
 from .voxels import winning_labels
@@ -21,8 +22,8 @@ DESCRIPTOR_SIZE = 3 * BINS
 def regional_labels(cloud: VoxelCloud, neighbours: Neighbours, radius: float) -> NDArray[np.uint8]:
     """Vote over the raw points within `radius` metres: S(p) of Sec. III-C, (V,)."""
     votes = np.zeros_like(cloud.votes)
-    _sum_votes(cloud.votes, neighbours.start, neighbours.index, neighbours.squared,
-               radius * radius, votes)
+    shared(_sum_votes, len(votes), cloud.votes, neighbours.start, neighbours.index,
+           neighbours.squared, radius * radius, votes)
     return winning_labels(votes, cloud.classes)
 
 
@@ -36,8 +37,8 @@ def normals(points: NDArray[np.float64], neighbours: Neighbours,
         ``(0, 0, 1)`` turned to the sensor where fewer than three points lie within the radius.
     """
     found = np.empty((len(points), 3))
-    _normals(points, neighbours.start, neighbours.index, neighbours.squared, radius * radius,
-             found)
+    shared(_normals, len(points), points, neighbours.start, neighbours.index,
+           neighbours.squared, radius * radius, found)
     return found
 
 
@@ -57,10 +58,11 @@ def fpfh(points: NDArray[np.float64], point_normals: NDArray[np.float64],
         Unit rows; a row of zeros where a point has no neighbour.
     """
     simple = np.zeros((len(points), DESCRIPTOR_SIZE), np.float32)
-    _simple_histograms(points.astype(np.float32), point_normals.astype(np.float32),
-                       neighbours.start, neighbours.index, simple)
+    shared(_simple_histograms, len(points), points.astype(np.float32),
+           point_normals.astype(np.float32), neighbours.start, neighbours.index, simple)
     full = np.zeros_like(simple)
-    _weighted_histograms(simple, neighbours.start, neighbours.index, neighbours.squared, full)
+    shared(_weighted_histograms, len(points), simple, neighbours.start, neighbours.index,
+           neighbours.squared, full)
     return unit_rows(full)
 
 
@@ -70,18 +72,20 @@ def unit_rows(descriptors: NDArray[np.float32]) -> NDArray[np.float32]:
     return (descriptors / np.maximum(length, 1e-12)).astype(np.float32)
 
 
-@numba.njit(cache=True, nogil=True, parallel=True)
-def _sum_votes(own, start, index, squared, limit, votes):  # type: ignore[no-untyped-def]
-    for i in numba.prange(len(own)):
+@numba.njit(cache=True, nogil=True)
+def _sum_votes(first, last, own, start, index, squared, limit,  # type: ignore[no-untyped-def]
+               votes):
+    for i in range(np.uint64(first), np.uint64(last)):
         for k in range(start[i], start[i + 1]):
             if squared[k] <= limit:
                 for c in range(own.shape[1]):
                     votes[i, c] += own[index[k], c]
 
 
-@numba.njit(cache=True, nogil=True, parallel=True)
-def _normals(points, start, index, squared, limit, found):  # type: ignore[no-untyped-def]
-    for i in numba.prange(len(points)):
+@numba.njit(cache=True, nogil=True)
+def _normals(first, last, points, start, index, squared, limit,  # type: ignore[no-untyped-def]
+             found):
+    for i in range(np.uint64(first), np.uint64(last)):
         n = 0
         # sums of differences to the point itself: no cancellation far from the origin
         sx = sy = sz = sxx = sxy = sxz = syy = syz = szz = 0.0
@@ -168,20 +172,21 @@ def _cosine_bin(cosine):  # type: ignore[no-untyped-def]
     return min(max(np.int32((cosine + 1) * np.float32(BINS / 2)), 0), BINS - 1)
 
 
-@numba.njit(cache=True, nogil=True, parallel=True, error_model='numpy',
+@numba.njit(cache=True, nogil=True, error_model='numpy',
             fastmath={'nsz', 'arcp', 'contract', 'afn', 'reassoc'})
-def _simple_histograms(points, normals, start, index, simple):  # type: ignore[no-untyped-def]
+def _simple_histograms(first, last, points, normals, start, index,  # type: ignore[no-untyped-def]
+                       simple):
     """SPFH of each point: angles of the Darboux frame to every neighbour, 11 bins each."""
-    for i in numba.prange(len(points)):
+    for i in range(np.uint64(first), np.uint64(last)):
         count = start[i + 1] - start[i] - 1
         if count < 1:
             continue
         bins = np.empty((3, count), np.int32)
         px, py, pz = points[i, 0], points[i, 1], points[i, 2]
         nx, ny, nz = normals[i, 0], normals[i, 1], normals[i, 2]
-        first = start[i] + 1
+        row = start[i] + 1
         for k in range(count):
-            j = index[first + k]
+            j = index[row + k]
             dx = points[j, 0] - px
             dy = points[j, 1] - py
             dz = points[j, 2] - pz
@@ -225,10 +230,11 @@ def _simple_histograms(points, normals, start, index, simple):  # type: ignore[n
             simple[i, 2 * BINS + bins[2, k]] += step
 
 
-@numba.njit(cache=True, nogil=True, parallel=True, error_model='numpy', fastmath=True)
-def _weighted_histograms(simple, start, index, squared, full):  # type: ignore[no-untyped-def]
+@numba.njit(cache=True, nogil=True, error_model='numpy', fastmath=True)
+def _weighted_histograms(first, last, simple, start, index, squared,  # type: ignore[no-untyped-def]
+                         full):
     """FPFH: own SPFH plus those of the neighbours by inverse squared distance."""
-    for i in numba.prange(len(simple)):
+    for i in range(np.uint64(first), np.uint64(last)):
         total = np.zeros(simple.shape[1], np.float32)
         for k in range(start[i] + 1, start[i + 1]):
             if squared[k] > 0:

@@ -5,13 +5,13 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.threads import shared
+
 MAX_CELLS = 250_000
 """Bound on the search grid: beyond it empty cells would cost more than longer candidate lists."""
 MOST_CANDIDATES = 20_000_000
 """Pairs of points to look at, some tenths of a second. Beyond it, as no surface of a scan is, of a
 point's candidates every second, third or so is looked at."""
-TASKS = 64
-"""Pieces of a search that threads share."""
 
 
 @dataclass(frozen=True)
@@ -63,11 +63,12 @@ def radius_neighbours(points: NDArray[np.float64], radius: float) -> Neighbours:
     step = -(-_candidates(cells, first, shape[1], shape[2]) // MOST_CANDIDATES)
     grid = columns, cells, order, first, shape[1], shape[2], radius * radius, step
     start = np.zeros(len(points) + 1, np.uint64)
-    _count(*grid, start)
+    shared(_count, len(points), *grid, start)
     np.cumsum(start, out=start)
     index = np.empty(start[-1], np.uint32)
     squared = np.empty(start[-1], np.float32)
-    _fill(*grid, start, index, squared)
+    longest = int(np.diff(start).max())
+    shared(_fill, len(points), *grid, start, longest, index, squared)
     return Neighbours(start, index, squared)
 
 
@@ -83,10 +84,10 @@ def _candidates(cells, first, ny, nz):  # type: ignore[no-untyped-def]
     return total
 
 
-@numba.njit(cache=True, nogil=True, parallel=True)
-def _count(columns, cells, order, first, ny, nz, limit, step,  # type: ignore[no-untyped-def]
-           start):
-    for at in numba.prange(len(order)):
+@numba.njit(cache=True, nogil=True)
+def _count(begin, end, columns, cells, order, first, ny, nz, limit,  # type: ignore[no-untyped-def]
+           step, start):
+    for at in range(np.uint64(begin), np.uint64(end)):
         x, y, z = columns[:, at]
         found = 0
         for dx in range(-1, 2):
@@ -105,28 +106,25 @@ def _count(columns, cells, order, first, ny, nz, limit, step,  # type: ignore[no
         start[order[at] + 1] = found + (step > 1)    # and itself
 
 
-@numba.njit(cache=True, nogil=True, parallel=True)
-def _fill(columns, cells, order, first, ny, nz, limit, step,  # type: ignore[no-untyped-def]
-          start, index, squared):
-    longest = np.diff(start).max() + 1
-    for task in numba.prange(TASKS):
-        # room for one candidate more than stay: every candidate is written, without a branch
-        near, gap = np.empty(longest, np.uint32), np.empty(longest, np.float32)
-        for at in range(len(order) * np.int64(task) // TASKS,
-                        len(order) * (np.int64(task) + 1) // TASKS):
-            x, y, z = columns[:, at]
-            near[0], gap[0] = order[at], 0.0
-            found = np.uint64(1)
-            for dx in range(-1, 2):
-                for dy in range(-1, 2):
-                    row = cells[at] + (dx * ny + dy) * nz
-                    for j in range(np.uint64(first[row - 1]), np.uint64(first[row + 2]),
-                                   np.uint64(step)):
-                        a, b, c = columns[0, j] - x, columns[1, j] - y, columns[2, j] - z
-                        d = a * a + b * b + c * c
-                        near[found], gap[found] = order[j], d
-                        found += np.uint64((d <= limit) & (j != np.uint64(at)))
-            begin = start[order[at]]
-            for k in range(found):
-                index[begin + k] = near[k]
-                squared[begin + k] = gap[k]
+@numba.njit(cache=True, nogil=True)
+def _fill(begin, end, columns, cells, order, first, ny, nz, limit,  # type: ignore[no-untyped-def]
+          step, start, longest, index, squared):
+    # room for one candidate more than stay: every candidate is written, without a branch
+    near, gap = np.empty(longest + 1, np.uint32), np.empty(longest + 1, np.float32)
+    for at in range(np.uint64(begin), np.uint64(end)):
+        x, y, z = columns[:, at]
+        near[0], gap[0] = order[at], 0.0
+        found = np.uint64(1)
+        for dx in range(-1, 2):
+            for dy in range(-1, 2):
+                row = cells[at] + (dx * ny + dy) * nz
+                for j in range(np.uint64(first[row - 1]), np.uint64(first[row + 2]),
+                               np.uint64(step)):
+                    a, b, c = columns[0, j] - x, columns[1, j] - y, columns[2, j] - z
+                    d = a * a + b * b + c * c
+                    near[found], gap[found] = order[j], d
+                    found += np.uint64((d <= limit) & (j != at))
+        first_of = start[order[at]]
+        for k in range(found):
+            index[first_of + k] = near[k]
+            squared[first_of + k] = gap[k]

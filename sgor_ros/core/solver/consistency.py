@@ -9,14 +9,12 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.threads import shared
 from ..matching.correspondences import Correspondences
 from ..scan.labels import labels_agree
 from .graph import ConsistencyGraph
 from .grouping import Groups
 from .grouping import squared_distance
-
-TASKS = 64
-"""The strongest keys come first and cost most: each task gets some of all strengths."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,37 +62,36 @@ def filter_groups(correspondences: Correspondences, graph: ConsistencyGraph, gro
     """
     filtered = FilteredGroups(np.full((len(groups.keys), keep), -1, np.int64),
                               np.zeros((len(groups.keys), keep), np.float32))
-    _filter(graph.start, graph.inner, graph.index, graph.weight, correspondences.source,
-            groups.keys, groups.squared_reach, *label_agreement(correspondences, semantics),
-            filtered.kept, filtered.scores)
+    shared(_filter, len(groups.keys), graph.start, graph.inner, graph.index, graph.weight,
+           correspondences.source, groups.keys, groups.squared_reach,
+           *label_agreement(correspondences, semantics), filtered.kept, filtered.scores)
     return filtered
 
 
-@numba.njit(cache=True, nogil=True, parallel=True)
-def _filter(start, inner, index, weight, points, keys, squared_reach,  # type: ignore[no-untyped-def]
-            tight, loose, kept, scores):
-    for task in numba.prange(TASKS):
-        support = np.empty(len(inner), np.float32)
-        for g in range(np.int64(task), len(keys), TASKS):
-            key = keys[g]
-            support[:] = 0    # row of M'_g W_m
-            for k in range(start[key], inner[key]):
-                a = index[k]
-                for e in range(start[a], start[a + 1]):
-                    support[index[e]] += weight[e]
-            x, y, z = points[key]
-            for k in range(start[key], inner[key]):
-                j = index[k]
-                if squared_distance(points[j, 0], points[j, 1], points[j, 2], x, y, z
-                                    ) > squared_reach[g]:
-                    continue
-                # M_s is the outer product of these with themselves (Eq. 9 to 11)
-                if not ((tight[key] and tight[j]) or (loose[key] and loose[j])):
-                    continue
-                total = np.float32(0.0)
-                for e in range(start[j], inner[j]):
-                    total += support[index[e]]
-                _insert(total, j, scores[g], kept[g])
+@numba.njit(cache=True, nogil=True)
+def _filter(first, last, start, inner, index, weight, points, keys,  # type: ignore[no-untyped-def]
+            squared_reach, tight, loose, kept, scores):
+    support = np.empty(len(inner), np.float32)
+    for g in range(first, last):
+        key = keys[g]
+        support[:] = 0    # row of M'_g W_m
+        for k in range(start[key], inner[key]):
+            a = index[k]
+            for e in range(start[a], start[a + 1]):
+                support[index[e]] += weight[e]
+        x, y, z = points[key]
+        for k in range(start[key], inner[key]):
+            j = index[k]
+            if squared_distance(points[j, 0], points[j, 1], points[j, 2], x, y, z
+                                ) > squared_reach[g]:
+                continue
+            # M_s is the outer product of these with themselves (Eq. 9 to 11)
+            if not ((tight[key] and tight[j]) or (loose[key] and loose[j])):
+                continue
+            total = np.float32(0.0)
+            for e in range(start[j], inner[j]):
+                total += support[index[e]]
+            _insert(total, j, scores[g], kept[g])
 
 
 @numba.njit(cache=True, nogil=True)

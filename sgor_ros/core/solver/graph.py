@@ -12,6 +12,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.threads import shared
 from ..config import SgorConfig
 from ..matching.correspondences import Correspondences
 from ..scan.voxels import thin
@@ -66,12 +67,13 @@ def consistency_graph(correspondences: Correspondences, config: SgorConfig) -> C
     columns = np.ascontiguousarray(np.hstack((p - p.mean(axis=0), q - q.mean(axis=0))).T,
                                    np.float32)
     bits = np.empty((n, -(-n // 64)), np.uint64)
-    _mark_pairs(columns, np.float32((reach + PREFILTER_SLACK)**2), bits)
-    _mirror(bits)
+    shared(_mark_pairs, (n + 1) // 2, columns, np.float32((reach + PREFILTER_SLACK)**2), bits)
+    shared(_mirror, bits.shape[1], bits)
     start = np.zeros(n + 1, np.uint64)
     nodes = n
     while True:
-        np.cumsum(_count_bits(bits), out=start[1:])
+        shared(_count_bits, n, bits, start[1:])
+        np.cumsum(start, out=start)
         if start[-1] <= MOST_EDGES:
             break
         # pairs go with the square of the nodes
@@ -82,8 +84,8 @@ def consistency_graph(correspondences: Correspondences, config: SgorConfig) -> C
     edges = np.empty((2, start[-1]), np.uint32)
     index, weight = edges[0], edges[1].view(np.float32)
     table = np.exp(-0.5 * (np.linspace(0, reach, WEIGHT_STEPS + 1) / config.sigma_d)**2)
-    _weigh_pairs(np.hstack((p, q)), bits, config.sigma_d, reach, table, start, inner, index,
-                 weight)
+    shared(_weigh_pairs, n, np.hstack((p, q)), bits, config.sigma_d, reach, table, start, inner,
+           index, weight)
     return ConsistencyGraph(start, inner, index, weight)
 
 
@@ -115,13 +117,12 @@ def _mark_row(columns, i, first, limit, near):  # type: ignore[no-untyped-def]
         near[j] = np.uint8(((p - q) * (p - q) <= limit * (s + s - limit)) | (s <= limit))
 
 
-@numba.njit(cache=True, nogil=True, parallel=True)
-def _mark_pairs(columns, limit, bits):  # type: ignore[no-untyped-def]
+@numba.njit(cache=True, nogil=True)
+def _mark_pairs(begin, end, columns, limit, bits):  # type: ignore[no-untyped-def]
     """Set bit j of row i for each candidate pair, from the 64 columns on that i itself is in."""
     n = columns.shape[1]
     gather = U64(0x0102040810204080)    # eight bytes of 0 or 1 to eight bits
-    for task in numba.prange((n + 1) // 2):
-        half = np.int64(task)
+    for half in range(begin, end):
         # row i beside row n - 1 - i: all tasks cost the same
         for i in ((half, n - 1 - half) if half != n - 1 - half else (half, half)):
             first = i // 64
@@ -135,12 +136,12 @@ def _mark_pairs(columns, limit, bits):  # type: ignore[no-untyped-def]
                 bits[i, first + w] = word
 
 
-@numba.njit(cache=True, nogil=True, parallel=True)
-def _mirror(bits):  # type: ignore[no-untyped-def]
+@numba.njit(cache=True, nogil=True)
+def _mirror(first, last, bits):  # type: ignore[no-untyped-def]
     """Fill the blocks of 64 x 64 below the diagonal from those above."""
     n, words = bits.shape
-    for task in numba.prange(words):
-        half = np.int64(task) // 2
+    for task in range(first, last):
+        half = task // 2
         row = words - 1 - half if task % 2 else half    # short and long ones for each thread
         block = np.empty(64, np.uint64)
         for column in range(row):
@@ -166,11 +167,10 @@ def _transpose(block):  # type: ignore[no-untyped-def]
         mask ^= mask << width
 
 
-@numba.njit(cache=True, nogil=True, parallel=True)
-def _count_bits(bits):  # type: ignore[no-untyped-def]
-    """Return the bits set in each row, (N,)."""
-    count = np.empty(len(bits), np.uint64)
-    for i in numba.prange(len(bits)):
+@numba.njit(cache=True, nogil=True)
+def _count_bits(first, last, bits, count):  # type: ignore[no-untyped-def]
+    """Write the bits set in each row, (N,)."""
+    for i in range(U64(first), U64(last)):
         total = U64(0)
         for word in bits[i]:
             # sums of 2, 4 and 8 bits side by side, then of all bytes
@@ -179,18 +179,17 @@ def _count_bits(bits):  # type: ignore[no-untyped-def]
             word = (word + (word >> U64(4))) & U64(0x0F0F0F0F0F0F0F0F)
             total += (word * U64(0x0101010101010101)) >> U64(56)
         count[i] = total
-    return count
 
 
-@numba.njit(cache=True, nogil=True, parallel=True, error_model='numpy')
-def _weigh_pairs(both, bits, sigma_d, reach, table, start,  # type: ignore[no-untyped-def]
+@numba.njit(cache=True, nogil=True, error_model='numpy')
+def _weigh_pairs(first, last, both, bits, sigma_d, reach, table, start,  # type: ignore[no-untyped-def]
                  inner, index, weight):
     """Write the rows of the graph: consistent pairs from the front, others from the back.
 
     Candidates that float64 finds beyond `reach` stay, with weight 0.
     """
     steps = len(table) - 1
-    for i in numba.prange(len(both)):
+    for i in range(U64(first), U64(last)):
         near = np.empty(start[i + 1] - start[i], np.uint32)
         gap = np.empty(len(near))
         found = U64(0)

@@ -5,6 +5,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.threads import shared
 from ..config import SgorConfig
 from ..matching.correspondences import Correspondences
 from .graph import ConsistencyGraph
@@ -46,7 +47,10 @@ def group(correspondences: Correspondences, graph: ConsistencyGraph,
     visits = np.cumsum((graph.inner - graph.start[:-1])[keys].astype(np.float64)**2)
     keys = keys[:max(int(np.searchsorted(visits, MOST_VISITS)), FEWEST_GROUPS)]
     k = min(config.group_size, len(correspondences))
-    return Groups(keys, _squared_reach(np.ascontiguousarray(correspondences.source.T), keys, k))
+    reach = np.empty(len(keys))
+    shared(_squared_reach, len(keys), np.ascontiguousarray(correspondences.source.T), keys, k,
+           reach)
+    return Groups(keys, reach)
 
 
 def leading_eigenvector(graph: ConsistencyGraph) -> NDArray[np.float32]:
@@ -58,16 +62,18 @@ def leading_eigenvector(graph: ConsistencyGraph) -> NDArray[np.float32]:
         Not negative, length one.
     """
     vector = np.ones(len(graph.inner), np.float32)
+    product = np.empty_like(vector)
     for _ in range(POWER_ITERATIONS):
-        vector = _multiply(graph.start, graph.inner, graph.index, graph.weight, vector)
-        vector /= np.linalg.norm(vector)
+        shared(_multiply, len(vector), graph.start, graph.inner, graph.index, graph.weight, vector,
+               product)
+        vector, product = product / np.linalg.norm(product), vector
     return vector
 
 
-@numba.njit(cache=True, nogil=True, parallel=True, fastmath=True)
-def _multiply(start, inner, index, weight, vector):  # type: ignore[no-untyped-def]
-    product = np.empty_like(vector)
-    for i in numba.prange(len(vector)):
+@numba.njit(cache=True, nogil=True, fastmath=True)
+def _multiply(first, last, start, inner, index, weight, vector,  # type: ignore[no-untyped-def]
+              product):
+    for i in range(U64(first), U64(last)):
         # four sums, so that an addition need not wait for the one before
         a = b = c = d = np.float32(0.0)
         e, end = start[i], inner[i]
@@ -81,7 +87,6 @@ def _multiply(start, inner, index, weight, vector):  # type: ignore[no-untyped-d
             a += weight[e] * vector[index[e]]
             e += U64(1)
         product[i] = (a + b) + (c + d)
-    return product
 
 
 @numba.njit(cache=True, nogil=True)
@@ -113,18 +118,16 @@ def _spread(points, order, count, spacing):  # type: ignore[no-untyped-def]
     return taken
 
 
-@numba.njit(cache=True, nogil=True, parallel=True)
-def _squared_reach(columns, keys, k):  # type: ignore[no-untyped-def]
-    """Return the k-th smallest squared distance to each key: for large k faster than a tree."""
+@numba.njit(cache=True, nogil=True)
+def _squared_reach(first, last, columns, keys, k, reach):  # type: ignore[no-untyped-def]
+    """Write the k-th smallest squared distance to each key: for large k faster than a tree."""
     n = columns.shape[1]
-    reach = np.empty(len(keys))
-    for g in numba.prange(len(keys)):
+    for g in range(U64(first), U64(last)):
         x, y, z = columns[:, keys[g]]
         squared = np.empty(n)
         for i in range(n):
             squared[i] = squared_distance(columns[0, i], columns[1, i], columns[2, i], x, y, z)
         reach[g] = _kth_smallest(squared, k)
-    return reach
 
 
 @numba.njit(cache=True, nogil=True, inline='always')

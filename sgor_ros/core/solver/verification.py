@@ -5,6 +5,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.threads import shared
 from ..config import SgorConfig
 from ..matching.correspondences import Correspondences
 from ..trust.evidence import rank
@@ -77,6 +78,22 @@ def ground_angles(T: NDArray[np.float64], source_normal: NDArray[np.float64],
                       moved @ target_normal)
 
 
+def truncated_distance(T: NDArray[np.float64], source: NDArray[np.float64],
+                       target: NDArray[np.float64], sigma_d: float) -> NDArray[np.float64]:
+    """Return the mean of TD over (N, 3) matches for each of (H, 4, 4) (Eq. 18 and 19), metres."""
+    cost = np.empty(len(T))
+    shared(_truncated_distance, len(T), T, source, target, sigma_d, cost)
+    return cost
+
+
+def near_counts(T: NDArray[np.float64], source: NDArray[np.float64], target: NDArray[np.float64],
+                reach: float) -> NDArray[np.int64]:
+    """Return how many of (N, 3) matches lie within `reach` metres for each of (H, 4, 4)."""
+    counts = np.zeros(len(T), np.int64)
+    shared(_near_counts, len(T), T, source, target, reach, counts)
+    return counts
+
+
 @numba.njit(cache=True, nogil=True, inline='always')
 def _squared_distance(T, p, q):  # type: ignore[no-untyped-def]
     squared = 0.0
@@ -86,24 +103,19 @@ def _squared_distance(T, p, q):  # type: ignore[no-untyped-def]
     return squared
 
 
-@numba.njit(cache=True, nogil=True, parallel=True, fastmath=True)
-def truncated_distance(T, source, target, sigma_d):  # type: ignore[no-untyped-def]
-    """Return the mean of TD over (N, 3) matches for each of (H, 4, 4) (Eq. 18 and 19), metres."""
-    cost = np.empty(len(T))
-    for h in numba.prange(len(T)):
+@numba.njit(cache=True, nogil=True, fastmath=True)
+def _truncated_distance(first, last, T, source, target, sigma_d,  # type: ignore[no-untyped-def]
+                        cost):
+    for h in range(first, last):
         total = 0.0
         for i in range(len(source)):
             squared = _squared_distance(T[h], source[i], target[i])
             total += min(max(np.sqrt(squared), 0.5 * sigma_d), 2.5 * sigma_d)
         cost[h] = total / len(source)
-    return cost
 
 
-@numba.njit(cache=True, nogil=True, parallel=True, fastmath=True)
-def near_counts(T, source, target, reach):  # type: ignore[no-untyped-def]
-    """Return how many of (N, 3) matches lie within `reach` metres for each of (H, 4, 4)."""
-    counts = np.zeros(len(T), np.int64)
-    for h in numba.prange(len(T)):
+@numba.njit(cache=True, nogil=True, fastmath=True)
+def _near_counts(first, last, T, source, target, reach, counts):  # type: ignore[no-untyped-def]
+    for h in range(first, last):
         for i in range(len(source)):
             counts[h] += _squared_distance(T[h], source[i], target[i]) < reach * reach
-    return counts

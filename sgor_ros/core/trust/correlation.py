@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common import se3
+from ..common.threads import shared
 from ..scan.voxels import thin
 from .view import kinds_of
 from .view import map_bits
@@ -41,7 +42,8 @@ def correlated(source: View, target: View, T_target_source: NDArray[np.float64],
     half = int(radius / (2 * overhead.edge))
     hits = np.zeros((TURNS, 2 * half + 1, 2 * half + 1), np.int32)
     # even and odd columns apart, so that every second cell is the next one in memory
-    _sweep(columns, bits, np.stack((overhead.cells[:, ::2], overhead.cells[:, 1::2])), half, hits)
+    shared(_sweep, TURNS * (2 * half + 1), columns, bits,
+           np.stack((overhead.cells[:, ::2], overhead.cells[:, 1::2])), half, hits)
     # the placement itself is no rival
     hits[0, half - 1:half + 2, half - 1:half + 2] = 0
     peaks = _peaks(hits, PEAKS)
@@ -61,13 +63,12 @@ def _quarter(turn: int) -> NDArray[np.float64]:
     return np.array([[cosine, -sine, 0], [sine, cosine, 0], [0, 0, 1]], np.float64)
 
 
-@numba.njit(cache=True, nogil=True, parallel=True)
-def _sweep(columns, bits, cells, half, hits):  # type: ignore[no-untyped-def]
+@numba.njit(cache=True, nogil=True)
+def _sweep(begin, end, columns, bits, cells, half, hits):  # type: ignore[no-untyped-def]
     """Count for each turn and shift, by two cells each, the points whose bit is in their cell."""
     size, width = cells.shape[1], 2 * half + 1
-    for task in numba.prange(len(columns) * width):
-        turn = np.int64(task) // width
-        i = np.int64(task) % width
+    for task in range(begin, end):
+        turn, i = task // width, task % width
         row = hits[turn, i]
         for k in range(columns.shape[1]):
             x = columns[turn, k, 0] + 2 * (i - half)

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common import se3
+from ..common.threads import shared
 from ..scan.labels import UNLABELLED
 from ..scan.voxels import thin
 from .view import direction
@@ -105,18 +106,17 @@ def _ask(source: View, target: View, T: NDArray[np.float64], sample: int, *, rou
     # roughly, whatever is in the cells around is a partner
     reach, near, margin = ((target.cell, target.cell, target.cell) if rough else
                            (target.reach, ON_SURFACE * target.reach, MARGIN * target.reach))
-    _outcomes(source.points[rows], source.labels[rows], T, target.points, target.normals,
-              target.labels, target.cell, target.slots, target.chain, target.nearest, reach,
-              near * near, margin, outcomes)
+    shared(_outcomes, outcomes.size, source.points[rows], source.labels[rows], T, target.points,
+           target.normals, target.labels, target.cell, target.slots, target.chain,
+           target.nearest, reach, near * near, margin, outcomes)
     return outcomes
 
 
-@numba.njit(cache=True, nogil=True, parallel=True)
-def _outcomes(points, labels, T, others, normals, other_labels, cell,  # type: ignore[no-untyped-def]
-              slots, chain, nearest, reach, limit, margin, outcomes):
-    for task in numba.prange(len(T) * len(points)):
-        h = np.int64(task) // len(points)
-        i = np.int64(task) % len(points)
+@numba.njit(cache=True, nogil=True)
+def _outcomes(first, last, points, labels, T, others, normals,  # type: ignore[no-untyped-def]
+              other_labels, cell, slots, chain, nearest, reach, limit, margin, outcomes):
+    for task in range(first, last):
+        h, i = task // len(points), task % len(points)
         x = T[h, 0, 0] * points[i, 0] + T[h, 0, 1] * points[i, 1] + T[h, 0, 2] * points[i, 2] \
             + T[h, 0, 3]
         y = T[h, 1, 0] * points[i, 0] + T[h, 1, 1] * points[i, 1] + T[h, 1, 2] * points[i, 2] \

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common import se3
+from ..common.threads import shared
 from ..scan.voxels import thin
 from .evidence import alike
 from .evidence import cells_around
@@ -43,8 +44,9 @@ def icp(source: View, target: View, T_target_source: NDArray[np.float64], wide: 
     """
     rows = thin(len(source.points), sample)
     T = np.array(T_target_source)
-    _icp(source.points[rows], source.labels[rows], T, target.points, target.normals,
-         target.labels, target.cell, target.slots, target.chain, target.reach, wide, narrow)
+    shared(_icp, len(T), source.points[rows], source.labels[rows], T, target.points,
+           target.normals, target.labels, target.cell, target.slots, target.chain, target.reach,
+           wide, narrow)
     return T
 
 
@@ -93,10 +95,10 @@ def _nearest(x, y, z, label, others, normals, other_labels, cell,  # type: ignor
     return at, best
 
 
-@numba.njit(cache=True, nogil=True, parallel=True)
-def _icp(points, labels, T, others, normals, other_labels, cell,  # type: ignore[no-untyped-def]
-         slots, chain, reach, wide, narrow):
-    for h in numba.prange(len(T)):
+@numba.njit(cache=True, nogil=True)
+def _icp(first, last, points, labels, T, others, normals, other_labels,  # type: ignore[no-untyped-def]
+         cell, slots, chain, reach, wide, narrow):
+    for h in range(first, last):
         rows = np.zeros((4, 6))    # normal, and the three axes: of translation and rotation
         for turn in range(wide + narrow):
             far = 2 * reach if turn < wide else reach
