@@ -8,6 +8,8 @@ from sgor_ros.io.bags import BagReader
 from sgor_ros.io.pointcloud2 import decode
 
 NUMBERS = (3, 4, 6)
+TIMES = {'nan time': 'nan', 'huge time': '1e300', 'negative time': '-4', 'time that falls': '2',
+         'time twice': '3', 'no time': 'four', 'three columns': '4 4 4'}
 
 
 def rigid(rng):
@@ -100,6 +102,17 @@ def broken(sequence, what):
     if what == 'times short':
         (sequence / 'times.txt').write_text('0\n1\n2\n')
         return 'times.txt: 3 rows, but the scans go up to number 6'
+    if what in TIMES:
+        (sequence / 'times.txt').write_text('0\n1\n2\n3\n' + TIMES[what] + '\n5\n6\n')
+        return 'times.txt: '
+    if what in ('pose nan', 'pose no rotation', 'calibration of zeros'):
+        poses = np.tile(np.eye(4)[:3].reshape(-1), (10, 1))
+        poses[4, 0] = {'pose nan': np.nan, 'pose no rotation': 1.1}.get(what, 1.0)
+        np.savetxt(sequence / 'poses.txt', poses)
+        Tr = np.zeros(12) if 'calibration' in what else poses[0]
+        (sequence / 'calib.txt').write_text(f'Tr: {" ".join(map(str, Tr))}\n')
+        return {'pose nan': 'the pose of scan 4 is not finite', 'pose no rotation':
+                'the pose of scan 4 is no rotation'}.get(what, 'Tr is no rotation')
     if what == 'times missing':
         (sequence / 'times.txt').unlink()
         return 'times.txt: no times'
@@ -109,13 +122,15 @@ def broken(sequence, what):
 
 @pytest.mark.parametrize('what', [
     'no folder', 'no scans', 'labels missing', 'labels short', 'scan truncated', 'times short',
-    'times missing', 'no calibration'])
+    'times missing', 'no calibration', 'pose nan', 'pose no rotation', 'calibration of zeros',
+    *TIMES])
 def test_broken_sequences(sequence, tmp_path, capsys, what):
     says = broken(sequence, what)
     assert main([str(sequence), str(tmp_path / 'bag')]) == 2
     message = capsys.readouterr().err
     assert message.startswith('error: ')
     assert says in message
+    assert not (tmp_path / 'bag').exists()
 
 
 def test_an_existing_bag_is_not_overwritten(sequence, tmp_path, capsys):

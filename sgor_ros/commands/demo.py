@@ -73,8 +73,8 @@ def _parse(arguments: list[str] | None) -> argparse.Namespace:
         'the node ended, was silent, failed often, or drifted by more than '
         f'{WORST_DRIFT_PERCENT:g} %')
     parser.add_argument('--out', type=Path, default=Path('out/demo'),
-                        help='folder for the bag, the pictures and the log; those of an older demo '
-                        'are replaced')
+                        help='folder for the bag, the pictures and the log; those of an older '
+                        'demo are replaced')
     parser.add_argument('--scans', type=int, default=120,
                         help=f'scans to play; the bag has {BAG_SCANS} at most, more of them are '
                         'that drive forth and back')

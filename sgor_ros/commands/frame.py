@@ -4,8 +4,6 @@ from argparse import ArgumentParser
 from argparse import Namespace
 from argparse import RawDescriptionHelpFormatter
 from collections.abc import Callable
-from collections.abc import Iterator
-from contextlib import contextmanager
 from importlib import metadata
 import os
 import signal
@@ -14,6 +12,7 @@ from textwrap import fill
 import threading
 import traceback
 from types import FrameType
+from typing import Any
 from typing import NoReturn
 
 from ..core.common.settings import InputError
@@ -22,19 +21,15 @@ OK = 0
 FAILED = 1
 REFUSED = 2
 BROKE_OFF = 3
+# as shells tell of what a signal has ended
 INTERRUPTED = 128 + signal.SIGINT
 UNHEARD = 128 + signal.SIGPIPE
-TERMINATED = 128 + signal.SIGTERM
 
 CODES = {
     REFUSED: 'cannot be done as told: an option, a file, or a package that is missing',
     BROKE_OFF: 'broke off: disk full, out of memory, or a fault of the program (with a traceback)',
-    INTERRUPTED: f'ended by SIGINT (Ctrl-C); {TERMINATED} by SIGTERM'}
+    INTERRUPTED: 'ended by SIGINT (Ctrl-C); 143 by SIGTERM'}
 HELP_WIDTH = 98
-
-
-class Terminated(BaseException):
-    """SIGTERM came."""
 
 
 class _Formatter(ArgumentDefaultsHelpFormatter, RawDescriptionHelpFormatter):
@@ -88,48 +83,71 @@ def version() -> str:
 
 
 def run(command: Callable[[Namespace], int], arguments: Namespace) -> int:
-    """Run a command and return its exit code; what it refuses is told in one line."""
+    """Run a command and return its exit code; what it refuses is told in one line.
+
+    SIGTERM ends it as Ctrl-C does, so that nothing half written stays behind.
+    """
+    signals = _Signals()
     try:
-        with _terminable():
+        with signals:
             code = command(arguments)
             sys.stdout.flush()
             return code
-    except InputError as error:
+    except _Ended:
+        return _by_signal(signals.came)
+    except Exception as error:
+        # in the midst of C code an exception may turn into another
+        return _by_signal(signals.came) if signals.came else _judged(error)
+
+
+class _Ended(BaseException):
+    """A signal came."""
+
+
+class _Signals:
+    """Notes SIGINT and SIGTERM and raises `_Ended` where they find the main thread."""
+
+    def __init__(self) -> None:
+        self.came = 0
+        self._before: dict[int, Any] = {}
+
+    def __enter__(self) -> None:
+        if threading.current_thread() is not threading.main_thread():
+            return
+        for number in (signal.SIGINT, signal.SIGTERM):
+            # ignored in the background of a script, say
+            if signal.getsignal(number) is not signal.SIG_IGN:
+                self._before[number] = signal.signal(number, self._end)
+
+    def __exit__(self, *_: object) -> None:
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
+
+    def _end(self, number: int, _: FrameType | None) -> None:
+        self.came = number
+        # the next one ends what clears away
+        signal.signal(number, signal.SIG_DFL)
+        raise _Ended
+
+
+def _by_signal(number: int) -> int:
+    return _end(128 + number, f'ended by {signal.Signals(number).name}')
+
+
+def _judged(error: Exception) -> int:
+    """Tell what went wrong and return the exit code for it."""
+    if isinstance(error, InputError):
         return _end(REFUSED, str(error))
-    except BrokenPipeError:
+    if isinstance(error, BrokenPipeError):
         # whoever read has had enough, as `head` does: nobody is left to tell
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return UNHEARD
-    except OSError as error:
+    if isinstance(error, OSError):
         return _end(BROKE_OFF, str(error))
-    except MemoryError as error:
+    if isinstance(error, MemoryError):
         return _end(BROKE_OFF, f'out of memory; {error}')
-    except KeyboardInterrupt:
-        return _end(INTERRUPTED, 'interrupted')
-    except Terminated:
-        return _end(TERMINATED, 'terminated')
-    except Exception:
-        traceback.print_exc()
-        return _end(BROKE_OFF, 'a fault of the program: please report it with the lines above')
-
-
-@contextmanager
-def _terminable() -> Iterator[None]:
-    """Let SIGTERM end the command as Ctrl-C does, so that nothing half written stays behind."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = signal.signal(signal.SIGTERM, _terminate)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)
-
-
-def _terminate(_: int, __: FrameType | None) -> None:
-    # the next one ends what clears away
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    raise Terminated
+    traceback.print_exception(error)
+    return _end(BROKE_OFF, 'a fault of the program: please report it with the lines above')
 
 
 def _end(code: int, message: str) -> int:
