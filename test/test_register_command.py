@@ -75,7 +75,8 @@ def test_options_reach_the_registration(pair, tmp_path, capsys):
     assert main([source, target, '--min-inliers', '10000']) == 1
     assert 'min_inliers is 10000' in capsys.readouterr().out
     params = tmp_path / 'params.yaml'
-    params.write_text('/**:\n  ros__parameters:\n    min_inliers: 9999\n    nonsense: 1\n    7: 1\n')
+    params.write_text('/**:\n  ros__parameters:\n    min_inliers: 9999\n    nonsense: 1\n'
+                      '    7: 1\n')
     assert main([source, target, '--params-file', str(params)]) == 1
     said = capsys.readouterr()
     assert 'min_inliers is 9999' in said.out

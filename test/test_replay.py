@@ -310,11 +310,11 @@ def test_corrupt_bags(street_bag, tmp_path, capsys, kind):
     assert 'Traceback' not in said
     assert not (tmp_path / 'out').exists()
     mcap = f'mcap recover {path / "bag.mcap"} -o FIXED.mcap'
-    advice = {'truncated': mcap, 'empty': mcap, 'garbage': mcap,
+    advice = {'metadata': f'ros2 bag reindex -s mcap {path}', 'truncated': mcap, 'empty': mcap, 'garbage': mcap,
               'text.mcap': f'mcap recover {path} -o', 'text.bag': f'rosbag reindex {path}',
               'text.db3': f'ros2 bag reindex -s sqlite3 {path.parent}'}
     assert advice.get(kind, '') in said
-    assert ('repair' in said) is (kind in advice or kind == 'metadata')
+    assert ('repair' in said) is (kind in advice)
 
 
 def test_a_bag_that_breaks_off_keeps_what_came_before(street, tmp_path, capsys):

@@ -19,7 +19,7 @@ from sgor_ros.io.writing import free_folder
 from sgor_ros.io.writing import new_file
 from sgor_ros.io.writing import new_folder
 
-SCANS = 6000    # so many that a signal comes long before the last one
+SCANS = 3000    # so many that a signal comes long before the last one
 DISK_BYTES = 400_000
 
 

@@ -5,6 +5,8 @@ from pathlib import Path
 
 from ..core.common.settings import InputError
 
+STORAGES = {'.mcap': 'mcap', '.db3': 'sqlite3'}
+
 
 @contextmanager
 def with_advice(path: Path) -> Iterator[None]:
@@ -12,7 +14,8 @@ def with_advice(path: Path) -> Iterator[None]:
     try:
         yield
     except InputError as error:
-        command = repair(path)
+        # its own message names the index, a file beside the messages
+        command = repair(path, index='metadata' in str(error))
         # without a cause it is no fault of the bytes: no such bag, no such topic
         if error.__cause__ is None or not command:
             raise
@@ -20,18 +23,15 @@ def with_advice(path: Path) -> Iterator[None]:
                          f'{command}') from error
 
 
-def repair(path: Path) -> str:
-    """Return the command that repairs what can be repaired, empty where the kind is unknown."""
+def repair(path: Path, *, index: bool) -> str:
+    """Return the command that repairs a bag, or its index; empty where the kind is unknown."""
     if path.suffix == '.bag':
         return f'rosbag reindex {path}'
-    folder = path if path.is_dir() else path.parent
     files = [path] if path.is_file() else sorted(
-        file for file in folder.glob('*') if file.suffix in ('.mcap', '.db3'))
-    if not files or files[0].suffix not in ('.mcap', '.db3'):
+        file for file in path.glob('*') if file.suffix in STORAGES)
+    if not files or files[0].suffix not in STORAGES:
         return ''
-    if files[0].suffix == '.db3':
-        return f'ros2 bag reindex -s sqlite3 {folder}'
-    recover = f'mcap recover {files[0]} -o FIXED.mcap'
-    if path.is_dir() and not (folder / 'metadata.yaml').is_file():
-        return f'ros2 bag reindex -s mcap {folder}, or {recover}'
-    return recover
+    if index or files[0].suffix == '.db3':
+        folder = path if path.is_dir() else path.parent
+        return f'ros2 bag reindex -s {STORAGES[files[0].suffix]} {folder}'
+    return f'mcap recover {files[0]} -o FIXED.mcap'

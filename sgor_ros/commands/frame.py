@@ -36,7 +36,8 @@ class _Formatter(ArgumentDefaultsHelpFormatter, RawDescriptionHelpFormatter):
     """Tells defaults that say something, and keeps the lines of examples."""
 
     def _get_help_string(self, action: object) -> str | None:
-        if getattr(action, 'default', None) in (None, False):
+        default = getattr(action, 'default', None)
+        if default is None or default is False:
             return getattr(action, 'help', None)
         return super()._get_help_string(action)    # type: ignore[arg-type]
 

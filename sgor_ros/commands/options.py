@@ -96,5 +96,5 @@ def _help(item: Setting) -> str:
     bounds = [f'at least {item.minimum:g}' if item.minimum is not None else '',
               f'at most {item.maximum:g}' if item.maximum is not None else '']
     default = f'{item.default:.6g}' if item.kind is float else str(item.default)
-    text = f'{item.description}; {", ".join(filter(None, [*bounds, f"default {default}"]))}'
-    return text.replace('%', '%%')
+    details = ', '.join(filter(None, [*bounds, f'default {default}' if default else '']))
+    return '; '.join(filter(None, (item.description, details))).replace('%', '%%')
