@@ -310,7 +310,8 @@ def test_corrupt_bags(street_bag, tmp_path, capsys, kind):
     assert 'Traceback' not in said
     assert not (tmp_path / 'out').exists()
     mcap = f'mcap recover {path / "bag.mcap"} -o FIXED.mcap'
-    advice = {'metadata': f'ros2 bag reindex -s mcap {path}', 'truncated': mcap, 'empty': mcap, 'garbage': mcap,
+    advice = {'truncated': mcap, 'empty': mcap, 'garbage': mcap,
+              'metadata': f'ros2 bag reindex -s mcap {path}',
               'text.mcap': f'mcap recover {path} -o', 'text.bag': f'rosbag reindex {path}',
               'text.db3': f'ros2 bag reindex -s sqlite3 {path.parent}'}
     assert advice.get(kind, '') in said
