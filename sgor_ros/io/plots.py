@@ -56,7 +56,7 @@ def plot_registration(path: str | Path, title: str, source: SemanticScan, target
     for label, pose, colour in (('target', np.eye(4), BLUE), ('source', T, ORANGE)):
         right.plot(*pose[:2, 3], 'o', ms=8, mfc=colour, mec='white', mew=1.5, zorder=5,
                    label=f'{label} sensor')
-    left.set_title(f'as they came; {int(result.inliers.sum())} inliers (green) of '
+    left.set_title(f'as they came; {int(result.inliers.sum())} inliers of '
                    f'{len(result.inliers)} matches')
     right.set_title('aligned' if result.success else f'not registered: {result.reason}; '
                     f'{"as they came" if result.T_target_source is None else "best candidate"}')
@@ -107,8 +107,10 @@ def _draw_cloud(axes: Any, points: NDArray[Any], low: NDArray[np.bool_], colour:
 def _draw_matches(axes: Any, source: Array, target: Array, inliers: NDArray[np.bool_]) -> None:
     from matplotlib.collections import LineCollection
     ends = np.stack((source[:, :2], target[:, :2]), axis=1)
-    for part, limit, colour, width, alpha in ((ends[~inliers], SHOWN_REJECTED, RED, 0.5, 0.3),
-                                              (ends[inliers], SHOWN_INLIERS, GREEN, 0.9, 0.8)):
+    for part, limit, colour, width, alpha, label in (
+            (ends[~inliers], SHOWN_REJECTED, RED, 0.5, 0.3, 'rejected match'),
+            (ends[inliers], SHOWN_INLIERS, GREEN, 0.9, 0.8, 'inlier')):
+        axes.plot([], [], color=colour, lw=1.5, label=label)
         axes.add_collection(LineCollection(list(part[::max(1, len(part) // limit)]),
                                            colors=colour, linewidths=width, alpha=alpha))
 
