@@ -61,7 +61,7 @@ say "Python: $python"
 mapfile -t packages < <(missing_packages "$python")
 [ ${#packages[@]} -eq 0 ] || install_packages "${packages[@]}"
 
-extras=open3d,benchmark,test,dev
+extras=open3d,benchmark,test,docs,dev
 options=() pins=()
 if [ "${ROS_DISTRO:-}" = jazzy ] && "$python" -c 'import rclpy' 2>/dev/null; then
     say 'ROS 2 Jazzy is here: using its rclpy'
@@ -79,6 +79,8 @@ say "making $venv (one to three minutes)"
 "$venv/bin/python" -m pip install -qq --disable-pip-version-check 'gtsam>=4.3' g2opy "${pins[@]}" ||
     say 'no GTSAM or g2o for this machine: the tests of docs/pose_graph.md are skipped'
 if [ "${#pins[@]}" -eq 0 ]; then
+    "$venv/bin/python" -m pip install -qq --disable-pip-version-check --editable '.[visualize]' ||
+        say 'no rerun for this machine: the tests of --visualize are skipped'
     say 'building tf2_msgs for the tests of /tf (a minute)'
     bash scripts/tf2_msgs.sh "$venv/bin/python" "$venv/tf2_msgs" ||
         say 'it could not be built (cmake and a C++ compiler?): the tests of /tf are skipped'

@@ -13,7 +13,7 @@ from sgor_ros.commands.frame import CODES
 
 MODULES = {'sgor_register': 'commands.register', 'sgor_replay': 'commands.replay',
            'sgor_kitti_to_bag': 'commands.kitti_to_bag', 'sgor_benchmark': 'commands.benchmark',
-           'sgor_demo': 'commands.demo', 'sgor_node': 'ros.node'}
+           'sgor_demo': 'commands.demo', 'sgor_tables': 'commands.tables', 'sgor_node': 'ros.node'}
 COMMANDS = [(name,) for name in MODULES if name != 'sgor_node'] + [
     ('sgor_benchmark', kind) for kind in ('pairs', 'wrong', 'ablation', 'sequence', 'solver')]
 WITHOUT_ROS = 'import sys; sys.modules["rclpy"] = None; from sgor_ros.{} import main; ' \

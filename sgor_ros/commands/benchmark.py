@@ -76,9 +76,9 @@ def _parser() -> Parser:
 
 
 def _add_common(command: ArgumentParser) -> None:
-    command.add_argument('--data', type=Path, metavar='FOLDER', help='with folders velodyne, '
-                         'labels and poses.txt, itself or up to two levels below, as in '
-                         'SemanticKITTI; each drive a place of its own')
+    command.add_argument('--data', type=Path, metavar='FOLDER', help='of drives with poses, '
+                         'itself or up to two levels below, as in SemanticKITTI (other layouts: '
+                         'docs/data.md); each drive a place of its own')
     command.add_argument('--world', action='store_true', help='use the built-in world; default '
                          'where there is no --data')
     command.add_argument('--seed', type=int, default=0, help='chooses pairs, turns and noise')

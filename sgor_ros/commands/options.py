@@ -14,8 +14,10 @@ from ..core.common.settings import InputError
 from ..core.common.settings import Setting
 from ..core.common.settings import Settings
 from ..core.config import SgorConfig
+from ..visualize import VIEWER
 
-PRESETS = {'outdoor': SgorConfig.outdoor, 'indoor': SgorConfig.indoor, 'paper': SgorConfig.paper}
+PRESETS = {'outdoor': SgorConfig.outdoor, 'indoor': SgorConfig.indoor, 'paper': SgorConfig.paper,
+           'kitti_protocol': SgorConfig.kitti_protocol}
 
 
 def add_preset(to: ArgumentParser) -> None:
@@ -41,6 +43,12 @@ def add_params_file(to: ArgumentParser) -> None:
     """Add the option for a YAML file as ROS nodes take it."""
     to.add_argument('--params-file', type=Path, metavar='YAML', default=SUPPRESS,
                     help='settings in the format of ROS parameter files; options go before')
+
+
+def add_visualize(to: ArgumentParser) -> None:
+    """Add the option for a live look."""
+    to.add_argument('--visualize', nargs='?', const=VIEWER, default=None, metavar='FILE.rrd',
+                    help='write what rerun shows to this file; without a file open its viewer')
 
 
 def configured[S: Settings](start: S, arguments: Namespace, parameters: dict[str, Any]) -> S:

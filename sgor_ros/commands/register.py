@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from .. import visualize
 from ..core.common import se3
 from ..core.common.settings import InputError
 from ..core.config import SgorConfig
@@ -30,6 +31,7 @@ from .frame import run
 from .options import add_params_file
 from .options import add_preset
 from .options import add_settings
+from .options import add_visualize
 from .options import configured
 from .options import PRESETS
 from .options import read_parameters
@@ -45,6 +47,8 @@ def register_files(arguments: Namespace) -> int:
     _check_outputs(arguments)
     config = configured(PRESETS[arguments.preset](), arguments,
                         read_parameters(arguments, SgorConfig.settings()))
+    if arguments.visualize is not None:
+        visualize.check(arguments.visualize)
     convention = arguments.target_label_convention or config.label_convention
     source = read_scan(arguments.source, arguments.source_labels)
     target = read_scan(arguments.target, arguments.target_labels)
@@ -64,6 +68,9 @@ def register_files(arguments: Namespace) -> int:
             place.write_text(json.dumps(_as_dict(result, arguments), indent=2) + '\n')
     if arguments.plot:
         _plot(arguments, source, target, result)
+    if arguments.visualize is not None:
+        with visualize.pair_view(arguments.visualize, config) as look:
+            look.show(source, target, result, _text(result))
     return OK if result.success else FAILED
 
 
@@ -86,6 +93,7 @@ def _parser() -> Parser:
                          'file is replaced')
     command.add_argument('--plot', type=Path, metavar='FILE', help='draw the result to '
                          f'({", ".join(PICTURES)}), likewise')
+    add_visualize(command)
     add_params_file(command)
     add_settings(command, 'settings (defaults are those of the preset outdoor)',
                  SgorConfig.settings())

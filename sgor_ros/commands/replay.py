@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
+from .. import visualize
 from ..core.common.settings import InputError
 from ..core.config import SgorConfig
 from ..core.scan.labels import label_convention
@@ -19,6 +20,9 @@ from ..core.warmup import warm_up
 from ..evaluation.track_plots import plot_track
 from ..io.bags import BagReader
 from ..io.bags import BagWriter
+from ..io.bags import is_bag
+from ..io.datasets import open_drive
+from ..io.datasets.clouds import DriveReader
 from ..io.environment import describe_environment
 from ..io.stream_config import StreamConfig
 from ..io.trajectories import write_kitti
@@ -27,7 +31,6 @@ from ..io.writing import free_folder
 from ..io.writing import new_folder
 from ..tracker import Tracker
 from ..tracker import TrackerConfig
-from .bag_repair import with_advice
 from .frame import FAILED
 from .frame import OK
 from .frame import Parser
@@ -35,6 +38,7 @@ from .frame import run
 from .options import add_params_file
 from .options import add_preset
 from .options import add_settings
+from .options import add_visualize
 from .options import configured
 from .options import PRESETS
 from .options import read_parameters
@@ -53,27 +57,36 @@ def replay(arguments: Namespace) -> int:
     parameters = read_parameters(arguments, [
         *SgorConfig.settings(), *TrackerConfig.settings(), *StreamConfig.settings()])
     stream = configured(StreamConfig(), arguments, parameters)
-    tracker = Tracker(configured(PRESETS[arguments.preset](), arguments, parameters),
+    drive = (None if is_bag(arguments.bag_path)
+             else open_drive(arguments.bag_path, arguments.sequence))
+    start = PRESETS[arguments.preset]()
+    if drive is not None:
+        start = start.replace(label_convention=drive.label_convention)
+    tracker = Tracker(configured(start, arguments, parameters),
                       configured(TrackerConfig(), arguments, parameters))
+    if arguments.visualize is not None:
+        visualize.check(arguments.visualize)
     label_convention(tracker.config.label_convention)
     warnings = Warnings()
     rows: list[Row] = []
     broken: InputError | None = None
     with ExitStack() as stack:
-        with with_advice(arguments.bag_path):
-            bag = stack.enter_context(BagReader(arguments.bag_path))
-            topic = arguments.topic or bag.find_topic(stream.label_field)
-            clouds, expected = bag.clouds(topic), bag.cloud_topics()[topic]
-        output: Path = arguments.output or free_folder(_usual_output(arguments.bag_path))
+        bag: BagReader | DriveReader = (
+            stack.enter_context(BagReader(arguments.bag_path)) if drive is None
+            else stack.enter_context(DriveReader(drive)))
+        topic = arguments.topic or bag.find_topic(stream.label_field)
+        clouds, expected = bag.clouds(topic), bag.cloud_topics()[topic]
+        output: Path = arguments.output or free_folder(_usual_output(arguments))
         place = stack.enter_context(new_folder(output))
         place.mkdir()
         with BagWriter(place / 'bag') if arguments.bag else nullcontext() as writer:
-            steps = Steps(tracker, stream, writer, warnings)
             warm_up(tracker.config)
+            look = (None if arguments.visualize is None else stack.enter_context(
+                visualize.track_view(arguments.visualize, tracker.config)))
+            steps = Steps(tracker, stream, writer, warnings, look)
             try:
-                with with_advice(arguments.bag_path):
-                    for cloud in tqdm(clouds, total=expected, unit='scan', disable=None):
-                        rows.append(steps.take(cloud))
+                for cloud in tqdm(clouds, total=expected, unit='scan', disable=None):
+                    rows.append(steps.take(cloud))
             except InputError as error:
                 broken = error    # what came before is worth keeping
         if broken and not rows:
@@ -97,19 +110,23 @@ def replay(arguments: Namespace) -> int:
 def _parser() -> Parser:
     command = Parser(
         'sgor_replay', 'BAG [options]', 'Track the labelled clouds of a bag (ROS 2 mcap or '
-        'sqlite3, ROS 1) and write trajectory.tum, trajectory_kitti.txt, summary.json and '
-        'trajectory.png into a new folder.',
-        ('sgor_replay bags/drive', 'sgor_replay drive.bag --topic /points --output out/first '
-         '--bag'),
+        'sqlite3, ROS 1), or the scans of a folder (SemanticKITTI and others, see docs/data.md), '
+        'and write trajectory.tum, trajectory_kitti.txt, summary.json and trajectory.png into a '
+        'new folder.',
+        ('sgor_replay bags/drive', 'sgor_replay sequences/08 --visualize',
+         'sgor_replay drive.bag --topic /points --output out/first --bag'),
         'done; scans that failed are told and counted',
         'no scan could be registered to another; the results are written')
-    command.add_argument('bag_path', type=Path, metavar='BAG')
+    command.add_argument('bag_path', type=Path, metavar='BAG', help='or folder of scans')
     command.add_argument('--topic', help='of the clouds; found where there is but one')
+    command.add_argument('--sequence', metavar='NAME', help='of the drives of a folder; found '
+                         'where there is but one')
     command.add_argument('--output', type=Path, metavar='FOLDER',
                          help='for the results, must not exist; default: out/NAME_replay with the '
                          'name of the bag, and _2, _3, ... behind it where that exists')
     command.add_argument('--bag', action='store_true',
                          help='also write a bag with /pose, /odometry and /correspondences')
+    add_visualize(command)
     add_params_file(command)
     add_preset(command)
     add_settings(command, 'clouds and frames', StreamConfig.settings())
@@ -119,10 +136,11 @@ def _parser() -> Parser:
     return command
 
 
-def _usual_output(bag: Path) -> Path:
+def _usual_output(arguments: Namespace) -> Path:
     """Return a folder that is not the bag's own, where a bag lies in out/ too."""
-    name = bag.resolve().name if bag.is_dir() else bag.stem
-    return Path('out') / f'{name}_replay'
+    bag: Path = arguments.bag_path
+    name = arguments.sequence or (bag.resolve().name if bag.is_dir() else bag.stem)
+    return Path('out') / f'{name.replace("/", "_")}_replay'
 
 
 def _summary(rows: list[Row], warnings: list[str], bag: Path, topic: str, tracker: Tracker,

@@ -11,8 +11,9 @@ from ...core.common.settings import InputError
 from ...core.config import SgorConfig
 from ...evaluation import pairs as pairing
 from ...evaluation import report
-from ...evaluation.pairs import Drive
 from ...evaluation.pairs import Pair
+from ...io.datasets import Drive
+from ...io.datasets import open_drives
 
 WORLD_SEEDS = (0, 1)
 WORLD_SCANS, WORLD_SPEED = 40, 45.0
@@ -55,7 +56,7 @@ def drives_of(arguments: Namespace) -> list[Drive]:
 
 def data_drives(arguments: Namespace) -> list[Drive]:
     """Return the drives of the user."""
-    return pairing.read_drives(arguments.data) if arguments.data else []
+    return open_drives(arguments.data) if arguments.data else []
 
 
 def world_drive(seed: int, scans: int, speed: float) -> Drive:

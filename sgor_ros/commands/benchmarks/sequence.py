@@ -9,7 +9,7 @@ from ...evaluation import report
 from ...evaluation import sequences
 from ...evaluation.honesty_table import honesty_table
 from ...evaluation.honesty_table import RULE
-from ...evaluation.pairs import Drive
+from ...io.datasets import Drive
 from ..scene_pairs import scene_drive
 from ..scene_pairs import scene_kinds
 from . import inputs
