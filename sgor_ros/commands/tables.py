@@ -1,5 +1,4 @@
 """`sgor_tables`: the tables and studies of the paper, on your data or in the built-in world."""
-from argparse import ArgumentParser
 from argparse import Namespace
 from collections.abc import Callable
 from collections.abc import Sequence
@@ -37,22 +36,24 @@ from ..evaluation.rivals import Answer
 from ..io.datasets import Drive
 from ..io.datasets import Frame
 from ..io.datasets import open_drives
-from . import options
+from . import frame
 
 SPEED_M_S = 8.0
 ABLATION = 'ablation'
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a protocol; return 0, or 2 on unusable input."""
-    return options.run(_tables, _parser().parse_args(arguments))
+    """Run the command and return its exit code."""
+    return frame.run(_tables, _parser().parse_args(arguments))
 
 
-def _parser() -> ArgumentParser:
-    parser = options.parser(
+def _parser() -> frame.Parser:
+    parser = frame.Parser(
+        'sgor_tables', 'PROTOCOL [options]',
         'Run a protocol of the literature with every method on the same matches, and print its '
         'table beside the published rows. Stopped, it goes on where it was when it is started '
-        'again with the same --output.')
+        'again with the same --output.',
+        ('sgor_tables strides', 'sgor_tables kitti-10m --data sequences --output out/kitti'))
     add = parser.add_argument
     add('protocol', choices=list(PROTOCOLS),
         help='kitti-10m: the 555 pairs by their rule or --list; kitti-loops: lists of loops in '
@@ -110,7 +111,7 @@ def _tables(arguments: Namespace) -> int:
                   variants=studies.variants(study, arguments.values, arguments.seed),
                   processes=arguments.processes, dask=arguments.dask)
     print(page.write(output, records, protocol, entries, study, features))
-    return 0
+    return frame.OK
 
 
 def _entries(arguments: Namespace, protocol: Protocol) -> list[Entry]:

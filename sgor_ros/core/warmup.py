@@ -7,8 +7,18 @@ from .scan.preprocessing import preprocess
 from .scan.scan import SemanticScan
 
 
-def warm_up(config: SgorConfig) -> None:
-    """Register a small made-up scene to itself, so that the first real scan does not wait."""
+def warm_up(config: SgorConfig | None = None) -> None:
+    """Compile what is not compiled yet, so that the first real scan does not wait.
+
+    Registers a small made-up scene to itself. In a fresh environment that takes a minute or two,
+    and the logger `sgor_ros` says so; afterwards, a second.
+
+    Parameters
+    ----------
+    config : SgorConfig, optional
+        The one that is used later: what it turns off is not compiled.
+    """
+    config = config or SgorConfig()
     rng = np.random.default_rng(0)
     size = 40 * min(config.voxel_size, 5.0)    # max_range has a bound
     walls = rng.uniform(-size, size, (3000, 3))

@@ -1,4 +1,7 @@
 """A log that tells everything and is still readable at ten scans a second."""
+from collections.abc import Iterator
+from contextlib import contextmanager
+import logging
 import re
 import time
 from typing import Any
@@ -56,3 +59,15 @@ class SparingLog:
             self._last.clear()
         self._last[key] = now
         return True
+
+
+@contextmanager
+def heard_from_the_library(logger: Any) -> Iterator[None]:
+    """Pass what the package says to its Python logger on to a logger of rclpy."""
+    source, handler = logging.getLogger('sgor_ros'), logging.Handler()
+    handler.emit = lambda record: logger.info(record.getMessage())    # type: ignore[method-assign]
+    source.addHandler(handler)
+    try:
+        yield
+    finally:
+        source.removeHandler(handler)

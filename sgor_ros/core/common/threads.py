@@ -20,9 +20,12 @@ os.environ.setdefault('OMP_WAIT_POLICY', 'passive')
 import numba
 from threadpoolctl import ThreadpoolController
 
+from .compiling import tell_of_compiling
+
 PIECES = 8
 """Pieces of the work for each thread: the last one to end leaves the others idle."""
 
+tell_of_compiling()
 # its names are made as it is loaded, unseen by type checkers
 _config: Any = numba.config
 # where the package has chosen a folder after numba was loaded by somebody else
