@@ -139,7 +139,9 @@ def squared_distance(ax, ay, az, bx, by, bz):  # type: ignore[no-untyped-def]
 @numba.njit(cache=True, nogil=True)
 def _kth_smallest(values, k):  # type: ignore[no-untyped-def]
     """Select by a histogram first, so that only one bin of it is sorted."""
-    top = values.max()
+    top = 0.0
+    for v in values:
+        top = max(top, v)
     if top == 0:
         return top
     scale = (BINS - 1) / top
@@ -156,4 +158,29 @@ def _kth_smallest(values, k):  # type: ignore[no-untyped-def]
         if U64(v * scale) == at:
             inside[n] = v
             n += 1
-    return np.sort(inside)[k - before - 1]
+    return _select(inside, k - before - 1)
+
+
+@numba.njit(cache=True, nogil=True)
+def _select(values, k):  # type: ignore[no-untyped-def]
+    """Return what stands at place k of the sorted values; spoils their order (Hoare)."""
+    low, high = 0, len(values) - 1
+    while low < high:
+        pivot = values[(low + high) // 2]
+        i, j = low, high
+        while i <= j:
+            while values[i] < pivot:
+                i += 1
+            while values[j] > pivot:
+                j -= 1
+            if i <= j:
+                values[i], values[j] = values[j], values[i]
+                i += 1
+                j -= 1
+        if k <= j:
+            high = j
+        elif k >= i:
+            low = i
+        else:
+            break
+    return values[k]

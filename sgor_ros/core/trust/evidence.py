@@ -106,9 +106,9 @@ def _ask(source: View, target: View, T: NDArray[np.float64], sample: int, *, rou
     # roughly, whatever is in the cells around is a partner
     reach, near, margin = ((target.cell, target.cell, target.cell) if rough else
                            (target.reach, ON_SURFACE * target.reach, MARGIN * target.reach))
-    shared(_outcomes, outcomes.size, source.points[rows], source.labels[rows], T, target.points,
-           target.normals, target.labels, target.cell, target.slots, target.chain,
-           target.nearest, reach, near * near, margin, outcomes)
+    shared(_outcomes, outcomes.size, source.points[rows], source.labels[rows],
+           np.ascontiguousarray(T), target.points, target.normals, target.labels, target.cell,
+           target.slots, target.chain, target.nearest, reach, near * near, margin, outcomes)
     return outcomes
 
 
