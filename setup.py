@@ -12,6 +12,7 @@ COMMANDS = {
     'sgor_kitti_to_bag': 'sgor_ros.commands.kitti_to_bag',
     'sgor_benchmark': 'sgor_ros.commands.benchmark',
     'sgor_demo': 'sgor_ros.commands.demo',
+    'sgor_warm_up': 'sgor_ros.commands.warm_up',
 }
 # .pcd and .ply files, and the built-in world; the module of open3d without CUDA
 OPEN3D = ['open3d-cpu>=0.18']
