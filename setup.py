@@ -14,7 +14,7 @@ COMMANDS = {
     'sgor_demo': 'sgor_ros.commands.demo',
     'sgor_warm_up': 'sgor_ros.commands.warm_up',
 }
-# .pcd and .ply files, and the built-in world; the module of open3d without CUDA
+# the built-in world; the module of open3d without CUDA
 OPEN3D = ['open3d-cpu>=0.18']
 
 setup(
@@ -27,10 +27,12 @@ setup(
     license='Apache-2.0',
     python_requires='>=3.12',
     packages=find_packages(include=['sgor_ros', 'sgor_ros.*']),
+    package_data={'sgor_ros': ['py.typed']},
     data_files=[
         ('share/ament_index/resource_index/packages', ['resource/sgor_ros']),
         (SHARE, ['package.xml']),
-        (f'{SHARE}/config', glob('config/*.yaml') + glob('config/*.rviz')),
+        (f'{SHARE}/config', glob('config/*.yaml') + glob('config/*.rviz')
+         + glob('config/*.json')),
         (f'{SHARE}/config/labels', glob('config/labels/*.yaml')),
         (f'{SHARE}/launch', glob('launch/*.py')),
     ],
@@ -54,6 +56,8 @@ setup(
         'benchmark': [*OPEN3D, 'kiss-icp', 'kiss_matcher'],
         # to run what docs/pose_graph.md shows
         'slam': ['gtsam>=4.3', 'g2opy'],
+        # --visualize; needs numpy 2, which the messages of an installed Jazzy do not take
+        'visualize': ['rerun-sdk>=0.41'],
         'test': ['pytest'],
         'dev': [
             'mypy',

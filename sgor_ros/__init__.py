@@ -7,6 +7,13 @@ from .cache import choose_cache_folder
 
 if TYPE_CHECKING:
     from .api import *  # noqa: F403
+    from .io.datasets import Drive as Drive
+    from .io.datasets import open_drive as open_drive
+    from .io.datasets import open_drives as open_drives
+    __version__: str
+
+DATASETS = ('Drive', 'open_drive', 'open_drives')
+"""What reads files, which the rest of the interface does not."""
 
 choose_cache_folder()
 
@@ -17,8 +24,18 @@ def __getattr__(name: str) -> Any:
     Every module of this package runs this file first, and compiled code takes a second to load:
     the node must know what to do about a signal before that.
     """
+    if name == '__version__':
+        metadata = import_module('importlib.metadata')
+        try:
+            return metadata.version(__name__)
+        except metadata.PackageNotFoundError:    # a checkout that nobody installed
+            return '0+unknown'
     if name == '__all__' or not name.startswith('_'):
         api = import_module('.api', __name__)
-        if name in ('__all__', *api.__all__):
+        if name == '__all__':
+            return [*api.__all__, *DATASETS]
+        if name in api.__all__:
             return getattr(api, name)
+        if name in DATASETS:
+            return getattr(import_module('.io.datasets', __name__), name)
     raise AttributeError(f'module {__name__!r} has no attribute {name!r}')

@@ -33,6 +33,8 @@ def benchmark_parser() -> ArgumentParser:
                              'random and evenly over data sets and distances')
     three = _add(commands, 'ablation', 'every mechanism off, one at a time')
     three.add_argument('--pairs', type=_positive, default=200, help='right pairs, likewise')
+    three.add_argument('--paper', action='store_true', help="only the rows of the paper's table "
+                       'and its other readings')
     for command in (one, two, three):
         command.add_argument('--max-distance', type=float, default=36.0, metavar='M',
                              help='between the sensors of a right pair')
@@ -59,9 +61,9 @@ def benchmark_parser() -> ArgumentParser:
 def _add(commands: Any, name: str, what: str) -> ArgumentParser:
     command: ArgumentParser = commands.add_parser(name, help=what, description=what,
                                                   formatter_class=ArgumentDefaultsHelpFormatter)
-    command.add_argument('--data', type=Path, metavar='FOLDER', help='with folders velodyne, '
-                         'labels and poses.txt, itself or up to two levels below, as in '
-                         'SemanticKITTI; each drive a place of its own')
+    command.add_argument('--data', type=Path, metavar='FOLDER', help='of drives with poses, '
+                         'itself or up to two levels below, as in SemanticKITTI (other layouts: '
+                         'docs/data.md); each drive a place of its own')
     command.add_argument('--world', action='store_true', help='use the built-in world; default '
                          'where there is no --data')
     command.add_argument('--seed', type=int, default=0)

@@ -11,8 +11,8 @@ from rosbags.typesys import Stores
 
 from ..core.common import se3
 from ..core.common.settings import InputError
-from ..evaluation.pairs import Drive
-from ..evaluation.pairs import read_drives
+from ..io.datasets import Drive
+from ..io.datasets import open_drive
 from ..io.messages import point_cloud2
 from .world_bag import FIRST_STAMP_NS
 from .world_bag import WorldMap
@@ -45,17 +45,14 @@ class Recorded:
 
 
 def recorded_drive(folder: Path, most: int) -> Recorded:
-    """Read up to `most` scans of a folder with ``velodyne`` and ``poses.txt``.
+    """Read up to `most` scans of a folder that `open_drive` knows, with poses.
 
     Raises
     ------
     InputError
         There is no such drive, or several, or it has no poses or fewer than two scans.
     """
-    drive, *others = read_drives(folder)
-    if others:
-        raise InputError(f'--data {folder}: {1 + len(others)} drives in it, name one: '
-                         f'{drive.name}, {others[0].name}, ...')
+    drive = open_drive(folder)
     if drive.T_world_sensor is None:
         raise InputError(f'--data {folder}: no poses.txt, and so no truth to compare with')
     if len(drive.frames) < 2:
@@ -71,7 +68,7 @@ def recorded_drive(folder: Path, most: int) -> Recorded:
                          classes[::MAP_POINTS].astype(np.uint32)))
         truth[stamp_ns] = pose
     world = WorldMap(*(np.concatenate(parts) for parts in zip(*seen, strict=True)))
-    return Recorded(truth, clouds, world, drive.frames[0].label_convention)
+    return Recorded(truth, clouds, world, drive.label_convention)
 
 
 def _scans(drive: Drive, most: int) -> Iterator[tuple[int, Any, Any, NDArray[np.float64]]]:

@@ -102,7 +102,7 @@ def run_dense(sets: Sequence[Matches], dense: Dense) -> list[Solved]:
     solvers: dict[str, Callable[[Matches], Any]] = {
         f'dense numpy, {DENSE_GROUPS} groups': lambda m: dense(
             m.source, m.target, config.sigma_d, config.weight_cutoff, config.groups,
-            config.group_size, config.group_keep, config.tau_1),
+            config.group_size, config.group_keep, config.tau_1, config.key_spacing),
         f'SGOR, {DENSE_GROUPS} groups': partial(_solve, config=config)}
     return [row for matches in tqdm(sets, 'dense', unit='set', disable=None)
             for row in _timed(matches, solvers, 1, config.tau_1)]
