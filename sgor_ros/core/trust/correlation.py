@@ -64,7 +64,7 @@ def _quarter(turn: int) -> NDArray[np.float64]:
 
 
 @numba.njit(cache=True, nogil=True)
-def _sweep(begin, end, columns, bits, cells, half, hits):  # type: ignore[no-untyped-def]
+def _sweep(begin, end, columns, bits, cells, half, hits):
     """Count for each turn and shift, by two cells each, the points whose bit is in their cell."""
     size, width = cells.shape[1], 2 * half + 1
     for task in range(begin, end):

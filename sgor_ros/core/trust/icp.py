@@ -62,7 +62,7 @@ def partners(source: View, target: View, T_target_source: NDArray[np.float64], s
 
 
 @numba.njit(cache=True, nogil=True)
-def _partners(placed, labels, others, normals, other_labels, cell,  # type: ignore[no-untyped-def]
+def _partners(placed, labels, others, normals, other_labels, cell,
               slots, chain, reach, limit, found):
     for i in range(len(placed)):
         at, best = _nearest(placed[i, 0], placed[i, 1], placed[i, 2], labels[i], others,
@@ -71,7 +71,7 @@ def _partners(placed, labels, others, normals, other_labels, cell,  # type: igno
 
 
 @numba.njit(cache=True, nogil=True)
-def _nearest(x, y, z, label, others, normals, other_labels, cell,  # type: ignore[no-untyped-def]
+def _nearest(x, y, z, label, others, normals, other_labels, cell,
              slots, chain, reach):
     """Return the partner with the smallest gap, -1 without any, and that gap, m^2."""
     best, at = np.inf, -1
@@ -95,7 +95,7 @@ def _nearest(x, y, z, label, others, normals, other_labels, cell,  # type: ignor
 
 
 @numba.njit(cache=True, nogil=True, error_model='numpy')
-def _icp(first, last, points, labels, T, others, normals, other_labels,  # type: ignore[no-untyped-def]
+def _icp(first, last, points, labels, T, others, normals, other_labels,
          cell, slots, chain, reach, wide, narrow):
     H, g = np.empty((6, 6), np.float64), np.empty(6, np.float64)
     # normal, and the three axes: of translation and rotation; and the error along each
@@ -142,7 +142,7 @@ def _icp(first, last, points, labels, T, others, normals, other_labels,  # type:
 
 
 @numba.njit(cache=True, nogil=True, error_model='numpy')
-def _solve(H, g):  # type: ignore[no-untyped-def]
+def _solve(H, g):
     """Replace g by the solution of H x = g, H positive definite and given below its diagonal.
 
     By hand, like `_turn`: numpy's functions take numba seconds to compile.
@@ -160,7 +160,7 @@ def _solve(H, g):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True, error_model='numpy')
-def _turn(T, back):  # type: ignore[no-untyped-def]
+def _turn(T, back):
     """Move a placement back by (translation, rotation about its own origin), target frame."""
     angle = math.sqrt(back[3] * back[3] + back[4] * back[4] + back[5] * back[5])
     if angle > 0:

@@ -135,7 +135,7 @@ def map_bits(kinds: NDArray[np.int64], sectors: NDArray[np.int64]) -> NDArray[np
 
 
 @numba.njit(cache=True, nogil=True)
-def _mark(columns, bits, cells):  # type: ignore[no-untyped-def]
+def _mark(columns, bits, cells):
     for i in range(len(bits)):
         for x in range(columns[i, 0] - 1, columns[i, 0] + 2):
             for y in range(columns[i, 1] - 1, columns[i, 1] + 2):
@@ -143,14 +143,14 @@ def _mark(columns, bits, cells):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True, inline='always')
-def slot_of(x, y, z, mask):  # type: ignore[no-untyped-def]
+def slot_of(x, y, z, mask):
     """Return where in the hash a cell begins."""
     key = x * np.int64(73856093) ^ y * np.int64(19349663) ^ z * np.int64(83492791)
     return (key ^ (key >> 15)) & mask
 
 
 @numba.njit(cache=True, nogil=True)
-def _hash_points(points, cell):  # type: ignore[no-untyped-def]
+def _hash_points(points, cell):
     size = 1024
     while size < 2 * len(points):
         size *= 2
@@ -166,7 +166,7 @@ def _hash_points(points, cell):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True, inline='always')
-def direction(x, y, z):  # type: ignore[no-untyped-def]
+def direction(x, y, z):
     """Return the cell of the range image that a point is seen in."""
     azimuth = int((atan2(y, x) / (2 * math.pi) + 0.5) * AZIMUTHS)
     elevation = int((atan2(z, math.sqrt(x * x + y * y)) / math.pi + 0.5) * ELEVATIONS)
@@ -174,7 +174,7 @@ def direction(x, y, z):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)
-def _range_image(points):  # type: ignore[no-untyped-def]
+def _range_image(points):
     nearest = np.full((AZIMUTHS, ELEVATIONS), np.inf, np.float32)
     for i in range(len(points)):
         x, y, z = points[i]
