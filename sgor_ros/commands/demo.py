@@ -107,7 +107,7 @@ def _run(options: argparse.Namespace) -> int:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f'--out {out}: {error.strerror}') from error
-    _say('starting sgor_node; the first start on a machine compiles, for a minute or two')
+    _say('starting sgor_node; the first start on a machine compiles, for half a minute')
     most = min(options.scans, BAG_SCANS)
     recorded = recorded_drive(options.data, most) if options.data else None
     convention = (recorded or SgorConfig()).label_convention

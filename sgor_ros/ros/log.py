@@ -12,6 +12,27 @@ REMEMBERED = 1000
 NUMBERS = re.compile(r'\d+(?:[.,\s]*\d+)*')
 
 
+class _Forward(logging.Handler):
+    def __init__(self, logger: Any) -> None:
+        super().__init__()
+        self._logger = logger
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self._logger.warning(record.getMessage())
+
+
+@contextmanager
+def forwarded(logger: Any) -> Iterator[None]:
+    """Pass on to a logger of rclpy what the library says meanwhile."""
+    forward = _Forward(logger)
+    library = logging.getLogger('sgor_ros')
+    library.addHandler(forward)
+    try:
+        yield
+    finally:
+        library.removeHandler(forward)
+
+
 class SparingLog:
     """Passes texts on to a logger of rclpy, leaving out repetitions."""
 
@@ -59,15 +80,3 @@ class SparingLog:
             self._last.clear()
         self._last[key] = now
         return True
-
-
-@contextmanager
-def heard_from_the_library(logger: Any) -> Iterator[None]:
-    """Pass what the package says to its Python logger on to a logger of rclpy."""
-    source, handler = logging.getLogger('sgor_ros'), logging.Handler()
-    handler.emit = lambda record: logger.info(record.getMessage())    # type: ignore[method-assign]
-    source.addHandler(handler)
-    try:
-        yield
-    finally:
-        source.removeHandler(handler)

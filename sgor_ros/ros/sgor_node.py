@@ -23,7 +23,7 @@ from .clouds import override_names
 from .commands import Commands
 from .gaps import Gaps
 from .health import Health
-from .log import heard_from_the_library
+from .log import forwarded
 from .log import SparingLog
 from .outputs import Outputs
 from .parameters import NodeParameters
@@ -120,7 +120,7 @@ class SgorNode(Node):
     def _warm_up(self) -> None:
         log = self.get_logger()
         begin = time.monotonic()
-        with heard_from_the_library(log):    # it says when it compiles
+        with forwarded(log):
             warm_up(self._settings.live[0])
         log.info(f'ready after {time.monotonic() - begin:.1f} s, waiting for clouds on '
                  f'{self.resolve_topic_name("points")}')

@@ -1,33 +1,50 @@
-"""Says when numba compiles: the first call on a machine takes a minute, and silence looks dead.
-
-Numba tells of a function once it has not found it in the cache, before it compiles it. The text
-goes to the logger `sgor_ros` as a warning: Python shows warnings where nobody has set up logging.
-"""
+"""Tells of compiling, which numba does without a word, and can refuse it."""
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import cache
 import logging
-from typing import Any
+import threading
 
 from numba.core import event
 
-_register: Any = event.register    # untyped
-_log = logging.getLogger('sgor_ros')
+PACKAGE = __name__.partition('.')[0]
+
+_thread = threading.local()
 
 
-class _Teller(event.Listener):
-    """Warns at the first function of this package."""
-
-    _told = False
-
-    def on_start(self, started: Any) -> None:
-        """Warn, once in the life of a process."""
-        if not self._told and started.data['dispatcher'].__module__.startswith('sgor_ros.'):
-            self._told = True
-            _log.warning('compiling for this machine, which takes a minute or two; once, the '
-                         'result is kept for the next start')
-
-    def on_end(self, ended: Any) -> None:
-        """Say nothing: the next function begins at once."""
+class NotCompiledError(Exception):
+    """A kernel is not in the cache."""
 
 
-def tell_of_compiling() -> None:
-    """Begin to listen; once a process is enough."""
-    _register('numba:compile', _Teller())
+@contextmanager
+def loading_only() -> Iterator[None]:
+    """Raise `NotCompiledError` where this thread would compile a kernel, rather than do it."""
+    _thread.loads_only = True
+    try:
+        yield
+    finally:
+        _thread.loads_only = False
+
+
+@cache
+def tell() -> None:
+    """Warn that it takes a while, once a process; where nobody logs, stderr gets it."""
+    logging.getLogger(PACKAGE).warning(
+        'compiling for this machine: once, it takes a quarter of a minute or so')
+
+
+class _Watch(event.Listener):
+    """Hears of each kernel that the cache does not have."""
+
+    def on_start(self, event: event.Event) -> None:
+        # whoever else uses numba in this process is none of our business
+        if event.data['dispatcher'].py_func.__module__.partition('.')[0] == PACKAGE:
+            if getattr(_thread, 'loads_only', False):
+                raise NotCompiledError
+            tell()
+
+    def on_end(self, event: event.Event) -> None:
+        pass
+
+
+event.register('numba:compile', _Watch())  # type: ignore[no-untyped-call]
