@@ -9,6 +9,7 @@ import time
 import numpy as np
 import pytest
 
+from sgor_ros import warm_up
 from sgor_ros.commands.frame import CODES
 
 MODULES = {'sgor_register': 'commands.register', 'sgor_replay': 'commands.replay',
@@ -30,6 +31,8 @@ def ran(*command, **options):
 
 @pytest.fixture(scope='module')
 def pair(street, tmp_path_factory):
+    # so that commands say nothing of compiling
+    warm_up()
     folder = tmp_path_factory.mktemp('pair')
     for name, (points, labels, _) in (('source', street[1]), ('target', street[0])):
         np.savez(folder / f'{name}.npz', points=points, labels=labels)
