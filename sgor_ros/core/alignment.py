@@ -57,7 +57,7 @@ def align(source: Surface, target: Surface, T_target_source: NDArray[np.float64]
 
     As small_gicp does it, by Gauss-Newton and with normals in place of covariances.
     """
-    T = np.array(T_target_source, np.float64)
+    T = np.array(T_target_source, np.float64, order='C')
     here, there = source.columns, target.columns
     sums = np.empty((BLOCKS, 29))
     converged = False
@@ -84,7 +84,7 @@ def align(source: Surface, target: Surface, T_target_source: NDArray[np.float64]
 
 
 @numba.njit(cache=True, nogil=True)
-def _nearest(x, y, z, points, first, ny, low, edge, reach):  # type: ignore[no-untyped-def]
+def _nearest(x, y, z, points, first, ny, low, edge, reach):
     """Return the nearest point within reach, -1 without any."""
     x_first, x_last = window(x, reach, low[0], edge, (len(first) - 1) // ny)
     y_first, y_last = window(y, reach, low[1], edge, ny)
@@ -99,7 +99,7 @@ def _nearest(x, y, z, points, first, ny, low, edge, reach):  # type: ignore[no-u
 
 
 @numba.njit(cache=True, nogil=True)
-def _sum_up(begin, end, points, normals, T, others, other_normals,  # type: ignore[no-untyped-def]
+def _sum_up(begin, end, points, normals, T, others, other_normals,
             first, ny, low, edge, reach, sums):
     """Sum up the information of each block (21: lower triangle), its gradient (6), error, pairs.
 
@@ -155,5 +155,5 @@ def _sum_up(begin, end, points, normals, T, others, other_normals,  # type: igno
 
 
 @numba.njit(cache=True, nogil=True, inline='always')
-def _cross(ax, ay, az, bx, by, bz):  # type: ignore[no-untyped-def]
+def _cross(ax, ay, az, bx, by, bz):
     return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx

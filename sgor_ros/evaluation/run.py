@@ -163,7 +163,7 @@ def rivals(say: Callable[[str], None]) -> dict[str, Method]:
 def _installed(module: str, say: Callable[[str], None]) -> bool:
     if find_spec(module) is not None:
         return True
-    say(f"{module} is not installed, so left out; pip install 'sgor_ros[benchmark]'")
+    say(f'{module} is not installed, so left out; to have it: pip install {module}')
     return False
 
 

@@ -20,6 +20,8 @@ os.environ.setdefault('OMP_WAIT_POLICY', 'passive')
 import numba
 from threadpoolctl import ThreadpoolController
 
+from . import compiling as compiling  # listens from now on
+
 PIECES = 8
 """Pieces of the work for each thread: the last one to end leaves the others idle."""
 

@@ -55,7 +55,7 @@ def in_columns(points: NDArray[np.float64], edge: float) -> Columns:
 
 
 @numba.njit(cache=True, nogil=True, inline='always')
-def window(value, reach, low, edge, count):  # type: ignore[no-untyped-def]
+def window(value, reach, low, edge, count):
     """Return the first column within reach of a value, and the one after the last."""
     # bounded before they are whole numbers: what is far away may be farther than those go
     return (np.int64(min(max(np.floor((value - reach - low) / edge), 0.0), count)),

@@ -57,7 +57,7 @@ def surface(points: NDArray[np.float64], edge: float) -> Surface | None:
 
 
 @numba.njit(cache=True, nogil=True)
-def _normals(begin, end, points, first, ny, low, edge, normals):  # type: ignore[no-untyped-def]
+def _normals(begin, end, points, first, ny, low, edge, normals):
     nx = (len(first) - 1) // ny
     near, gaps = np.empty(NEIGHBOURS, np.int64), np.empty(NEIGHBOURS)
     for i in range(begin, end):

@@ -69,7 +69,7 @@ def filter_groups(correspondences: Correspondences, graph: ConsistencyGraph, gro
 
 
 @numba.njit(cache=True, nogil=True)
-def _filter(first, last, start, inner, index, weight, points, keys,  # type: ignore[no-untyped-def]
+def _filter(first, last, start, inner, index, weight, points, keys,
             squared_reach, tight, loose, kept, scores):
     support = np.empty(len(inner), np.float32)
     for g in range(first, last):
@@ -95,7 +95,7 @@ def _filter(first, last, start, inner, index, weight, points, keys,  # type: ign
 
 
 @numba.njit(cache=True, nogil=True)
-def _insert(score, item, scores, items):  # type: ignore[no-untyped-def]
+def _insert(score, item, scores, items):
     """Put an item into its place among the best; the worst drops out."""
     at = len(scores) - 1
     if score <= scores[at]:

@@ -99,7 +99,7 @@ def _leave(bits: NDArray[np.uint64], rows: NDArray[np.intp]) -> None:
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True)
-def _mark_row(columns, i, first, limit, near):  # type: ignore[no-untyped-def]
+def _mark_row(columns, i, first, limit, near):
     """Write whether (|p_i - p_j| - |q_i - q_j|)^2 <= limit for j from `first` on, without a root.
 
     Slices, and not an index that starts at `first`, let the compiler use vectors.
@@ -118,7 +118,7 @@ def _mark_row(columns, i, first, limit, near):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)
-def _mark_pairs(begin, end, columns, limit, bits):  # type: ignore[no-untyped-def]
+def _mark_pairs(begin, end, columns, limit, bits):
     """Set bit j of row i for each candidate pair, from the 64 columns on that i itself is in."""
     n = columns.shape[1]
     gather = U64(0x0102040810204080)    # eight bytes of 0 or 1 to eight bits
@@ -137,7 +137,7 @@ def _mark_pairs(begin, end, columns, limit, bits):  # type: ignore[no-untyped-de
 
 
 @numba.njit(cache=True, nogil=True)
-def _mirror(first, last, bits):  # type: ignore[no-untyped-def]
+def _mirror(first, last, bits):
     """Fill the blocks of 64 x 64 below the diagonal from those above."""
     n, words = bits.shape
     for task in range(first, last):
@@ -153,7 +153,7 @@ def _mirror(first, last, bits):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)
-def _transpose(block):  # type: ignore[no-untyped-def]
+def _transpose(block):
     """Transpose 64 x 64 bits: swap the off-diagonal quarters, then within each quarter."""
     width, mask = U64(32), U64(0x00000000FFFFFFFF)
     while width:
@@ -168,7 +168,7 @@ def _transpose(block):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)
-def _count_bits(first, last, bits, count):  # type: ignore[no-untyped-def]
+def _count_bits(first, last, bits, count):
     """Write the bits set in each row, (N,)."""
     for i in range(U64(first), U64(last)):
         total = U64(0)
@@ -182,7 +182,7 @@ def _count_bits(first, last, bits, count):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True, error_model='numpy')
-def _weigh_pairs(first, last, both, bits, sigma_d, reach, table, start,  # type: ignore[no-untyped-def]
+def _weigh_pairs(first, last, both, bits, sigma_d, reach, table, start,
                  inner, index, weight):
     """Write the rows of the graph: consistent pairs from the front, others from the back.
 

@@ -71,7 +71,7 @@ def leading_eigenvector(graph: ConsistencyGraph) -> NDArray[np.float32]:
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True)
-def _multiply(first, last, start, inner, index, weight, vector,  # type: ignore[no-untyped-def]
+def _multiply(first, last, start, inner, index, weight, vector,
               product):
     for i in range(U64(first), U64(last)):
         # four sums, so that an addition need not wait for the one before
@@ -90,7 +90,7 @@ def _multiply(first, last, start, inner, index, weight, vector,  # type: ignore[
 
 
 @numba.njit(cache=True, nogil=True)
-def _spread(points, order, count, spacing):  # type: ignore[no-untyped-def]
+def _spread(points, order, count, spacing):
     """Take the strongest first, passing over those near a taken one; then fill up with those."""
     taken = np.empty(count, np.uint32)
     passed = np.empty(len(order), np.uint32)
@@ -119,7 +119,7 @@ def _spread(points, order, count, spacing):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)
-def _squared_reach(first, last, columns, keys, k, reach):  # type: ignore[no-untyped-def]
+def _squared_reach(first, last, columns, keys, k, reach):
     """Write the k-th smallest squared distance to each key: for large k faster than a tree."""
     n = columns.shape[1]
     for g in range(U64(first), U64(last)):
@@ -131,15 +131,17 @@ def _squared_reach(first, last, columns, keys, k, reach):  # type: ignore[no-unt
 
 
 @numba.njit(cache=True, nogil=True, inline='always')
-def squared_distance(ax, ay, az, bx, by, bz):  # type: ignore[no-untyped-def]
+def squared_distance(ax, ay, az, bx, by, bz):
     """Return the squared distance of two points; whoever asks for members rounds alike."""
     return (ax - bx) * (ax - bx) + (ay - by) * (ay - by) + (az - bz) * (az - bz)
 
 
 @numba.njit(cache=True, nogil=True)
-def _kth_smallest(values, k):  # type: ignore[no-untyped-def]
+def _kth_smallest(values, k):
     """Select by a histogram first, so that only one bin of it is sorted."""
-    top = values.max()
+    top = 0.0
+    for v in values:
+        top = max(top, v)
     if top == 0:
         return top
     scale = (BINS - 1) / top
@@ -156,4 +158,29 @@ def _kth_smallest(values, k):  # type: ignore[no-untyped-def]
         if U64(v * scale) == at:
             inside[n] = v
             n += 1
-    return np.sort(inside)[k - before - 1]
+    return _select(inside, k - before - 1)
+
+
+@numba.njit(cache=True, nogil=True)
+def _select(values, k):
+    """Return what stands at place k of the sorted values; spoils their order (Hoare)."""
+    low, high = 0, len(values) - 1
+    while low < high:
+        pivot = values[(low + high) // 2]
+        i, j = low, high
+        while i <= j:
+            while values[i] < pivot:
+                i += 1
+            while values[j] > pivot:
+                j -= 1
+            if i <= j:
+                values[i], values[j] = values[j], values[i]
+                i += 1
+                j -= 1
+        if k <= j:
+            high = j
+        elif k >= i:
+            low = i
+        else:
+            break
+    return values[k]

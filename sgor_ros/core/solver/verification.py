@@ -95,7 +95,7 @@ def near_counts(T: NDArray[np.float64], source: NDArray[np.float64], target: NDA
 
 
 @numba.njit(cache=True, nogil=True, inline='always')
-def _squared_distance(T, p, q):  # type: ignore[no-untyped-def]
+def _squared_distance(T, p, q):
     squared = 0.0
     for a in range(3):
         gap = T[a, 0] * p[0] + T[a, 1] * p[1] + T[a, 2] * p[2] + T[a, 3] - q[a]
@@ -104,7 +104,7 @@ def _squared_distance(T, p, q):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True)
-def _truncated_distance(first, last, T, source, target, sigma_d,  # type: ignore[no-untyped-def]
+def _truncated_distance(first, last, T, source, target, sigma_d,
                         cost):
     for h in range(first, last):
         total = 0.0
@@ -115,7 +115,7 @@ def _truncated_distance(first, last, T, source, target, sigma_d,  # type: ignore
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True)
-def _near_counts(first, last, T, source, target, reach, counts):  # type: ignore[no-untyped-def]
+def _near_counts(first, last, T, source, target, reach, counts):
     for h in range(first, last):
         for i in range(len(source)):
             counts[h] += _squared_distance(T[h], source[i], target[i]) < reach * reach

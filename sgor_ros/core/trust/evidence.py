@@ -108,14 +108,15 @@ def _ask(source: View, target: View, T: NDArray[np.float64], sample: int, *, rou
     reach, near, margin = ((wide, wide, wide) if rough else
                            (target.reach, ON_SURFACE * target.reach, MARGIN * target.reach))
     columns = target.columns
-    shared(_outcomes, outcomes.size, source.points[rows], source.labels[rows], T, columns.points,
-           target.column_normals, target.column_labels, columns.first, columns.ny, columns.low,
-           columns.edge, target.nearest, reach, near * near, margin, outcomes)
+    shared(_outcomes, outcomes.size, source.points[rows], source.labels[rows],
+           np.ascontiguousarray(T), columns.points, target.column_normals, target.column_labels,
+           columns.first, columns.ny, columns.low, columns.edge, target.nearest, reach,
+           near * near, margin, outcomes)
     return outcomes
 
 
 @numba.njit(cache=True, nogil=True)
-def _outcomes(first, last, points, labels, T, others, normals,  # type: ignore[no-untyped-def]
+def _outcomes(first, last, points, labels, T, others, normals,
               other_labels, columns, ny, low, edge, nearest, reach, limit, margin, outcomes):
     for task in range(first, last):
         h, i = task // len(points), task % len(points)
@@ -138,7 +139,7 @@ def _outcomes(first, last, points, labels, T, others, normals,  # type: ignore[n
 
 
 @numba.njit(cache=True, nogil=True)
-def _on_surface(x, y, z, label, others, normals, other_labels,  # type: ignore[no-untyped-def]
+def _on_surface(x, y, z, label, others, normals, other_labels,
                 columns, ny, low, edge, reach, limit):
     """Return whether a surface of the same label is near, by `gap` below `limit`."""
     x_first, x_last = window(x, reach, low[0], edge, (len(columns) - 1) // ny)
@@ -154,13 +155,13 @@ def _on_surface(x, y, z, label, others, normals, other_labels,  # type: ignore[n
 
 
 @numba.njit(cache=True, nogil=True, inline='always')
-def alike(one, other):  # type: ignore[no-untyped-def]
+def alike(one, other):
     """Return whether two regional labels may be of one thing; the unlabelled may be anything."""
     return one == other or min(one, other) == UNLABELLED
 
 
 @numba.njit(cache=True, nogil=True, inline='always')
-def gap(a, b, c, squared, normal):  # type: ignore[no-untyped-def]
+def gap(a, b, c, squared, normal):
     """Return the squared distance to a surface: full across it, a share of it along it."""
     across = a * normal[0] + b * normal[1] + c * normal[2]
     return across * across * (1 - TANGENTIAL) + TANGENTIAL * squared
