@@ -6,13 +6,13 @@ from .threads import shared
 
 
 def at_once[A, B](threads: int, one: Callable[[], A], other: Callable[[], B]) -> tuple[A, B]:
-    """Run two tasks, on up to so many threads together; return what they return."""
+    """Run two tasks, each on up to half of so many threads; return what they return."""
     first: list[A] = []
     second: list[B] = []
 
     def run(begin: int, end: int) -> None:
         # what is allowed is said anew: each thread of the pool has a limit of its own
-        with cores(threads):
+        with cores(max(threads // 2, 1)):
             if begin == 0:
                 first.append(one())
             if end == 2:
