@@ -1,6 +1,8 @@
 """Geometric consistency of all pairs of correspondences as a sparse graph (Sec. III-C).
 
-Only 1 to 3 % of the pairs are consistent, so nothing here is N x N but one bit a pair.
+Few pairs are consistent, on real matches 1 to 10 %, and nothing but these is kept. Each pair is
+looked at once: float32 finds candidates above the diagonal, band by band of rows; float64 decides;
+then the other half is filled from the first.
 
 Indices are unsigned: numba lets signed ones count from the end, which costs as much as the rest
 of these loops.
@@ -12,6 +14,11 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.lanes import at_most
+from ..common.lanes import count
+from ..common.lanes import load
+from ..common.lanes import lowest
+from ..common.lanes import splat
 from ..common.threads import shared
 from ..config import SgorConfig
 from ..matching.correspondences import Correspondences
@@ -20,203 +27,279 @@ from ..scan.voxels import thin
 PREFILTER_SLACK = 1e-3
 """Metres: float32 finds the candidate pairs, float64 decides. In a scan of 100 m the former errs
 by some 1e-5."""
-WEIGHT_STEPS = 8192
-"""Steps of the table of W_m; between them it is linear, which is off by 1e-7 or so at the most."""
+STEPS = 1024
+"""Of the table of W_m for each sigma_d; between them it is linear, off by 1e-7 at the most."""
 MOST_EDGES = 2**25
-"""A quarter of a gigabyte; with more, and most matches right, some of them do."""
+"""A fifth of a gigabyte; with more, and most matches right, some of them do."""
+SAMPLE = 1000
+"""Correspondences that tell beforehand how many edges there will be."""
+BAND_PAIRS, FEWEST_BANDS, MOST_BANDS = 2**21, 4, 64
+"""Candidates of so many pairs fit into the cache of a core."""
 
 U64 = np.uint64
 _ONE = U64(1)
-# the lowest bit of a word, times this, has the place of that bit in its upper six bits
-_DE_BRUIJN = U64(0x03F79D71B4CB0A89)
-_PLACES = np.empty(64, np.uint32)
-_PLACES[[(int(_DE_BRUIJN) << place & 2**64 - 1) >> 58 for place in range(64)]] = range(64)
 
 
 @dataclass(frozen=True, eq=False)
 class ConsistencyGraph:
-    """Pairs of correspondences with d_ij up to `weight_cutoff` sigma_d, as compressed rows.
+    """Pairs of correspondences with d_ij <= sigma_d (M', Eq. 6), as compressed rows.
 
-    Row i is ``index[start[i]:start[i + 1]]``; its first part, up to ``inner[i]``, holds the
-    consistent ones (d_ij <= sigma_d: M'_g, Eq. 6), i itself among them.
+    Row i is ``index[start[i]:start[i + 1]]``, i itself in it; the matrix is symmetric.
 
     Attributes
     ----------
     start : (N + 1,) uint64
-    inner : (N,) uint64
-    index : (E,) uint32
+    index : (E,) uint16, or uint32 from 65,537 correspondences on
     weight : (E,) float32
         W_m of each pair (Eq. 8).
+    sigma_d : float
+        Metres.
+    reach : float
+        d_ij up to which W_m is not zero, metres; beyond sigma_d it is not kept here.
     """
 
     start: NDArray[np.uint64]
-    inner: NDArray[np.uint64]
-    index: NDArray[np.uint32]
+    index: NDArray[np.uint16] | NDArray[np.uint32]
+    weight: NDArray[np.float32]
+    sigma_d: float
+    reach: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Band:
+    """The consistent pairs i <= j of the rows from `first` on, `length` of each, in order."""
+
+    first: int
+    length: NDArray[np.uint64]
+    index: NDArray[np.uint16] | NDArray[np.uint32]
     weight: NDArray[np.float32]
 
 
 def consistency_graph(correspondences: Correspondences, config: SgorConfig) -> ConsistencyGraph:
     """Compare all pairs of correspondences by length (Eq. 5, 6 and 8).
 
-    Where more than `MOST_EDGES` are near, only some of the correspondences, evenly spread, have
-    edges.
+    Where more than `MOST_EDGES` are consistent, only some of the correspondences, evenly spread,
+    have edges.
     """
     p, q = correspondences.source, correspondences.target
-    n = len(p)
-    reach = config.sigma_d * config.weight_cutoff
-    columns = np.ascontiguousarray(np.hstack((p - p.mean(axis=0), q - q.mean(axis=0))).T,
-                                   np.float32)
-    bits = np.empty((n, -(-n // 64)), np.uint64)
-    shared(_mark_pairs, (n + 1) // 2, columns, np.float32((reach + PREFILTER_SLACK)**2), bits)
-    shared(_mirror, bits.shape[1], bits)
-    start = np.zeros(n + 1, np.uint64)
-    nodes = n
+    n = nodes = len(p)
+    if n > SAMPLE:
+        some = thin(n, SAMPLE)
+        nodes = _affordable(n, _edges(*_upper(p[some], q[some], SAMPLE, config)) * (n / SAMPLE)**2)
     while True:
-        shared(_count_bits, n, bits, start[1:])
-        np.cumsum(start, out=start)
-        if start[-1] <= MOST_EDGES:
+        bands, below = _upper(p, q, nodes, config)
+        edges = _edges(bands, below)
+        if edges <= MOST_EDGES:
             break
-        # pairs go with the square of the nodes
-        nodes = min(int(nodes * math.sqrt(MOST_EDGES / int(start[-1]))), nodes - 1)
-        _leave(bits, thin(n, nodes))
-    inner = np.empty(n, np.uint64)
-    # one piece of memory: of two, the system takes back what the next call asks for again
-    edges = np.empty((2, start[-1]), np.uint32)
-    index, weight = edges[0], edges[1].view(np.float32)
-    table = np.exp(-0.5 * (np.linspace(0, reach, WEIGHT_STEPS + 1) / config.sigma_d)**2)
-    shared(_weigh_pairs, n, np.hstack((p, q)), bits, config.sigma_d, reach, table, start, inner,
-           index, weight)
-    return ConsistencyGraph(start, inner, index, weight)
+        nodes = min(_affordable(nodes, edges), nodes - 1)
+    # of each row first those before it, then itself and those after
+    before = below.sum(axis=0, dtype=np.uint64)
+    start = np.zeros(n + 1, np.uint64)
+    np.cumsum(before + np.concatenate([band.length for band in bands]), out=start[1:])
+    middle = start[:-1] + before
+    place = np.cumsum(below, axis=0, dtype=np.uint64) - below + start[:-1]
+    index = np.empty(edges, bands[0].index.dtype)
+    weight = np.empty(edges, np.float32)
+
+    def fill(first: int, last: int) -> None:
+        for band, own in zip(bands[first:last], place[first:last], strict=True):
+            _fill(band.first, band.length, band.index, band.weight, middle, own, index, weight)
+
+    shared(fill, len(bands))
+    return ConsistencyGraph(start, index, weight, config.sigma_d,
+                            config.sigma_d * config.weight_cutoff)
 
 
-def _leave(bits: NDArray[np.uint64], rows: NDArray[np.intp]) -> None:
-    """Clear all bits but those of the given rows and columns."""
-    n, words = bits.shape
-    kept = np.zeros(64 * words, np.bool_)
-    kept[rows] = True
-    bits[~kept[:n]] = 0
-    bits &= np.packbits(kept, bitorder='little').view('<u8')
+def _affordable(nodes: int, edges: float) -> int:
+    """Return how many of the nodes have no more than `MOST_EDGES`: pairs go with their square."""
+    return int(nodes * math.sqrt(MOST_EDGES / max(edges, MOST_EDGES)))
 
 
-@numba.njit(cache=True, nogil=True, fastmath=True)
-def _mark_row(columns, i, first, limit, near):  # type: ignore[no-untyped-def]
-    """Write whether (|p_i - p_j| - |q_i - q_j|)^2 <= limit for j from `first` on, without a root.
+def _edges(bands: list[_Band], below: NDArray[np.uint32]) -> int:
+    return sum(len(band.index) for band in bands) + int(below.sum(dtype=np.uint64))
 
-    Slices, and not an index that starts at `first`, let the compiler use vectors.
+
+def _upper(p: NDArray[np.float64], q: NDArray[np.float64], nodes: int, config: SgorConfig
+           ) -> tuple[list[_Band], NDArray[np.uint32]]:
+    """Find the consistent pairs i <= j among some of (N, 3) matches, evenly spread.
+
+    Returns
+    -------
+    list of _Band
+        In order, all rows.
+    (len(bands), N) uint32
+        How many i < j of each j are in each band.
     """
-    px, py, pz, qx, qy, qz = columns[:, i]
-    ax, ay, az = columns[0, first:], columns[1, first:], columns[2, first:]
-    bx, by, bz = columns[3, first:], columns[4, first:], columns[5, first:]
-    for j in range(len(ax)):
-        x, y, z = ax[j] - px, ay[j] - py, az[j] - pz
-        p = x * x + y * y + z * z
-        x, y, z = bx[j] - qx, by[j] - qy, bz[j] - qz
-        q = x * x + y * y + z * z
-        s = p + q
-        # (a^2 - b^2)^2 = d (2 s - d) with d = (a - b)^2 grows with d up to d = s
-        near[j] = np.uint8(((p - q) * (p - q) <= limit * (s + s - limit)) | (s <= limit))
+    n = len(p)
+    columns = lanes_of(p - p.mean(axis=0), q - q.mean(axis=0))
+    if nodes < n:
+        others = np.ones(n, np.bool_)
+        others[thin(n, nodes)] = False
+        columns[:, :n][:, others] = np.nan
+    both = np.hstack((p, q))
+    table = weight_table(config.sigma_d, config.sigma_d)
+    limit = prefilter_limit(config.sigma_d)
+    count = min(max(n * n // BAND_PAIRS // 2, FEWEST_BANDS), MOST_BANDS)
+    # rows get shorter, so bands get wider, to cost the same
+    rows = np.rint(n - n * np.sqrt(1 - np.arange(count + 1) / count)).astype(np.int64)
+    below = np.zeros((count, n), np.uint32)
+    bands: list[_Band] = [None] * count    # type: ignore[list-item]
+
+    def find(first: int, last: int) -> None:
+        for b in range(first, last):
+            length = np.empty(rows[b + 1] - rows[b], np.uint64)
+            bits = np.empty((len(length), columns.shape[1] // 64), np.uint64)
+            candidates = _mark(rows[b], columns, limit, bits)
+            index = np.empty(candidates, np.uint16 if n <= 2**16 else np.uint32)
+            weight = np.empty(candidates, np.float32)
+            found = _weigh(rows[b], both, bits, config.sigma_d, table, length, below[b], index,
+                           weight)
+            bands[b] = _Band(rows[b], length, index[:found], weight[:found])
+
+    shared(find, count)
+    return bands, below
+
+
+def lanes_of(p: NDArray[np.float64], q: NDArray[np.float64]) -> NDArray[np.float32]:
+    """Return (N, 3) and (N, 3) as six rows of whole words of 64, filled up with NaN."""
+    columns = np.full((6, -(-len(p) // 64) * 64), np.nan, np.float32)
+    columns[:3, :len(p)], columns[3:, :len(p)] = p.T, q.T
+    return columns
+
+
+def prefilter_limit(reach: float) -> np.float32:
+    """Return the bound of (P - Q)^2 / (P + Q), P and Q squared lengths that differ by `reach`.
+
+    With d = (a - b)^2 is (a^2 - b^2)^2 = d (2 (a^2 + b^2) - d) < 2 d (a^2 + b^2), and hardly less
+    where a pair is longer than the reach.
+    """
+    return np.float32(2 * (reach + PREFILTER_SLACK)**2)
+
+
+def weight_table(sigma_d: float, reach: float) -> NDArray[np.float64]:
+    """Return W_m (Eq. 8) for differences from 0 to `reach`, `STEPS` for each sigma_d."""
+    steps = math.ceil(STEPS * reach / sigma_d)
+    table: NDArray[np.float64] = np.exp(-0.5 * (np.linspace(0, reach, steps + 1) / sigma_d)**2)
+    return table
 
 
 @numba.njit(cache=True, nogil=True)
-def _mark_pairs(begin, end, columns, limit, bits):  # type: ignore[no-untyped-def]
-    """Set bit j of row i for each candidate pair, from the 64 columns on that i itself is in."""
-    n = columns.shape[1]
-    gather = U64(0x0102040810204080)    # eight bytes of 0 or 1 to eight bits
-    for half in range(begin, end):
-        # row i beside row n - 1 - i: all tasks cost the same
-        for i in ((half, n - 1 - half) if half != n - 1 - half else (half, half)):
-            first = i // 64
-            near = np.zeros(64 * (bits.shape[1] - first), np.uint8)
-            _mark_row(columns, i, 64 * first, limit, near)
-            eights = near.view(np.uint64)
-            for w in range(bits.shape[1] - first):
-                word = U64(0)
-                for b in range(8):
-                    word |= ((eights[8 * w + b] * gather) >> U64(56)) << U64(8 * b)
-                bits[i, first + w] = word
+def mark_row(columns, from_word, px, py, pz, qx, qy, qz, limit, row):  # type: ignore[no-untyped-def]
+    """Set bit j of a row where the lengths to j may differ by the reach, from a word on."""
+    ax, ay, az = columns[0], columns[1], columns[2]
+    bx, by, bz = columns[3], columns[4], columns[5]
+    px, py, pz = splat(px), splat(py), splat(pz)
+    qx, qy, qz = splat(qx), splat(qy), splat(qz)
+    most = splat(limit)
+    for w in range(U64(from_word), U64(len(row))):
+        word = U64(0)
+        for part in range(U64(0), U64(64), U64(16)):
+            j = w * U64(64) + part
+            x, y, z = load(ax, j) - px, load(ay, j) - py, load(az, j) - pz
+            p = x * x + y * y + z * z
+            x, y, z = load(bx, j) - qx, load(by, j) - qy, load(bz, j) - qz
+            q = x * x + y * y + z * z
+            gap = p - q
+            word |= at_most(gap * gap, most * (p + q)) << part
+        row[w] = word
 
 
 @numba.njit(cache=True, nogil=True)
-def _mirror(first, last, bits):  # type: ignore[no-untyped-def]
-    """Fill the blocks of 64 x 64 below the diagonal from those above."""
-    n, words = bits.shape
-    for task in range(first, last):
-        half = task // 2
-        row = words - 1 - half if task % 2 else half    # short and long ones for each thread
-        block = np.empty(64, np.uint64)
-        for column in range(row):
-            for k in range(64):
-                block[k] = bits[64 * column + k, row]
-            _transpose(block)
-            for k in range(min(64, n - 64 * row)):
-                bits[64 * row + k, column] = block[k]
+def _mark(first, columns, limit, bits):  # type: ignore[no-untyped-def]
+    """Set bit j of the rows from `first` on for each candidate pair i <= j; return how many."""
+    found = U64(0)
+    for r in range(len(bits)):
+        i = first + r
+        px, py, pz, qx, qy, qz = columns[:, i]
+        row = bits[r]
+        w = U64(i) // U64(64)
+        mark_row(columns, w, px, py, pz, qx, qy, qz, limit, row)
+        row[w] &= ~U64(0) << (U64(i) % U64(64))
+        for k in range(w, U64(len(row))):
+            found += count(row[k])
+    return found
 
 
 @numba.njit(cache=True, nogil=True)
-def _transpose(block):  # type: ignore[no-untyped-def]
-    """Transpose 64 x 64 bits: swap the off-diagonal quarters, then within each quarter."""
-    width, mask = U64(32), U64(0x00000000FFFFFFFF)
-    while width:
-        k = U64(0)
-        while k < U64(64):    # the rows of upper quarters
-            swap = ((block[k] >> width) ^ block[k + width]) & mask
-            block[k + width] ^= swap
-            block[k] ^= swap << width
-            k = (k + width + _ONE) & ~width
-        width >>= _ONE
-        mask ^= mask << width
-
-
-@numba.njit(cache=True, nogil=True)
-def _count_bits(first, last, bits, count):  # type: ignore[no-untyped-def]
-    """Write the bits set in each row, (N,)."""
-    for i in range(U64(first), U64(last)):
-        total = U64(0)
-        for word in bits[i]:
-            # sums of 2, 4 and 8 bits side by side, then of all bytes
-            word -= (word >> _ONE) & U64(0x5555555555555555)
-            word = (word & U64(0x3333333333333333)) + ((word >> U64(2)) & U64(0x3333333333333333))
-            word = (word + (word >> U64(4))) & U64(0x0F0F0F0F0F0F0F0F)
-            total += (word * U64(0x0101010101010101)) >> U64(56)
-        count[i] = total
+def places_of_bits(row, from_word, places):  # type: ignore[no-untyped-def]
+    """Write the places of all bits that are set, from a word on; return how many."""
+    found = U64(0)
+    for w in range(U64(from_word), U64(len(row))):
+        word = row[w]
+        while word:
+            places[found] = U64(64) * w + lowest(word)
+            found += _ONE
+            word &= word - _ONE
+    return found
 
 
 @numba.njit(cache=True, nogil=True, error_model='numpy')
-def _weigh_pairs(first, last, both, bits, sigma_d, reach, table, start,  # type: ignore[no-untyped-def]
-                 inner, index, weight):
-    """Write the rows of the graph: consistent pairs from the front, others from the back.
+def measure(both, places, count, px, py, pz, qx, qy, qz, gap, other):  # type: ignore[no-untyped-def]
+    """Write d_ij (Eq. 5) from one match to the first `count` of some places."""
+    for k in range(U64(count)):
+        j = places[k]
+        x, y, z = both[j, 0] - px, both[j, 1] - py, both[j, 2] - pz
+        gap[k] = x * x + y * y + z * z
+        x, y, z = both[j, 3] - qx, both[j, 4] - qy, both[j, 5] - qz
+        other[k] = x * x + y * y + z * z
+    # the root alone: vectors
+    for k in range(count):
+        gap[k] = abs(math.sqrt(gap[k]) - math.sqrt(other[k]))
 
-    Candidates that float64 finds beyond `reach` stay, with weight 0.
-    """
-    steps = len(table) - 1
-    for i in range(U64(first), U64(last)):
-        near = np.empty(start[i + 1] - start[i], np.uint32)
-        gap = np.empty(len(near))
-        found = U64(0)
-        for w in range(bits.shape[1]):
-            word = bits[i, w]
-            while word:
-                low = word & (~word + _ONE)
-                near[found] = U64(64) * U64(w) + _PLACES[(low * _DE_BRUIJN) >> U64(58)]
-                found += _ONE
-                word ^= low
+
+@numba.njit(cache=True, nogil=True, inline='always')
+def weigh(d, per_metre, last_cell, table):  # type: ignore[no-untyped-def]
+    """Return W_m of a difference up to the end of the table."""
+    at = d * per_metre
+    cell = U64(min(at, last_cell))
+    return np.float32(table[cell] + (at - cell) * (table[cell + _ONE] - table[cell]))
+
+
+@numba.njit(cache=True, nogil=True, error_model='numpy')
+def _weigh(first, both, bits, sigma_d, table, length, below, index,  # type: ignore[no-untyped-def]
+           weight):
+    """Write the consistent ones of the candidates, row after row; return how many."""
+    n = len(both)
+    places, gap, other = np.empty(n, np.uint32), np.empty(n), np.empty(n)
+    per_metre, last_cell = (len(table) - 1) / sigma_d, len(table) - 2.0
+    at = U64(0)
+    for r in range(len(bits)):
+        i = first + r
+        near = places_of_bits(bits[r], i // 64, places)
         px, py, pz, qx, qy, qz = both[i]
-        for k in range(len(near)):
-            j = near[k]
-            x, y, z = both[j, 0] - px, both[j, 1] - py, both[j, 2] - pz
-            length = math.sqrt(x * x + y * y + z * z)
-            x, y, z = both[j, 3] - qx, both[j, 4] - qy, both[j, 5] - qz
-            gap[k] = abs(length - math.sqrt(x * x + y * y + z * z))
-        front, back = start[i], start[i + 1] - _ONE
-        for k in range(len(near)):
-            d = gap[k]
-            at = d * (steps / reach)
-            cell = U64(min(at, steps - 1.0))
-            value = np.float32(table[cell] + (at - cell) * (table[cell + _ONE] - table[cell]))
-            # written at both ends and kept at one: no branch to mispredict
-            index[front] = index[back] = near[k]
-            weight[front] = weight[back] = value if d <= reach else np.float32(0.0)
-            consistent = U64(d <= sigma_d)
-            front += consistent
-            back -= _ONE - consistent
-        inner[i] = front
+        measure(both, places, near, px, py, pz, qx, qy, qz, gap, other)
+        begin = at
+        for k in range(near):
+            # written anyhow, and kept where consistent: no branch to mispredict
+            j = places[k]
+            index[at] = j
+            weight[at] = weigh(gap[k], per_metre, last_cell, table)
+            consistent = gap[k] <= sigma_d
+            at += U64(consistent)
+            below[j] += U64(consistent)
+        length[r] = at - begin
+        if length[r]:
+            below[i] -= _ONE    # itself
+    return at
+
+
+@numba.njit(cache=True, nogil=True)
+def _fill(first, length, band_index, band_weight, middle, place, index,  # type: ignore[no-untyped-def]
+          weight):
+    """Write the pairs of a band into the rows i, from their middle on, and into the rows j."""
+    e = U64(0)
+    for r in range(U64(len(length))):
+        i = U64(first) + r
+        at = middle[i]
+        end = e + length[r]
+        while e < end:
+            j, w = band_index[e], band_weight[e]
+            index[at] = j
+            weight[at] = w
+            at += _ONE
+            if j != i:
+                to = place[j]
+                index[to] = i
+                weight[to] = w
+                place[j] = to + _ONE
+            e += _ONE

@@ -44,7 +44,7 @@ def group(correspondences: Correspondences, graph: ConsistencyGraph,
     keys = _spread(correspondences.source, order, min(config.groups, len(order)),
                    config.key_spacing)
     # where most matches are right, rows are long and few groups do
-    visits = np.cumsum((graph.inner - graph.start[:-1])[keys].astype(np.float64)**2)
+    visits = np.cumsum(np.diff(graph.start)[keys].astype(np.float64)**2)
     keys = keys[:max(int(np.searchsorted(visits, MOST_VISITS)), FEWEST_GROUPS)]
     k = min(config.group_size, len(correspondences))
     reach = np.empty(len(keys))
@@ -61,22 +61,20 @@ def leading_eigenvector(graph: ConsistencyGraph) -> NDArray[np.float32]:
     (N,) float32
         Not negative, length one.
     """
-    vector = np.ones(len(graph.inner), np.float32)
+    vector = np.ones(len(graph.start) - 1, np.float32)
     product = np.empty_like(vector)
     for _ in range(POWER_ITERATIONS):
-        shared(_multiply, len(vector), graph.start, graph.inner, graph.index, graph.weight, vector,
-               product)
+        shared(_multiply, len(vector), graph.start, graph.index, graph.weight, vector, product)
         vector, product = product / np.linalg.norm(product), vector
     return vector
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True)
-def _multiply(first, last, start, inner, index, weight, vector,  # type: ignore[no-untyped-def]
-              product):
+def _multiply(first, last, start, index, weight, vector, product):  # type: ignore[no-untyped-def]
     for i in range(U64(first), U64(last)):
         # four sums, so that an addition need not wait for the one before
         a = b = c = d = np.float32(0.0)
-        e, end = start[i], inner[i]
+        e, end = start[i], start[i + U64(1)]
         while e + U64(4) <= end:
             a += weight[e] * vector[index[e]]
             b += weight[e + U64(1)] * vector[index[e + U64(1)]]
