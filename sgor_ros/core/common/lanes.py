@@ -5,9 +5,9 @@ choose what is added: such loops say here what they mean. Whatever the processor
 NEON), LLVM finds instructions for it.
 
 All are for compiled code: ``splat(x)``, ``load(array, at)`` and ``store(array, at, lanes)`` with
-any alignment and no check of bounds; ``+``, ``-``, ``*``; ``where(bits, lanes)``, zero where a
-bit is not set; ``at_most(a, b)``, the bits of a <= b; ``total(lanes)``. And for words
-of 64 bits ``lowest(word)``, the place of the lowest that is set, and ``count(word)``.
+any alignment and no check of bounds; ``+``, ``-``, ``*``; ``add_where(bits, a, b)``, a + b where
+a bit is set and else a; ``at_most(a, b)``, the bits of a <= b; ``total(lanes)``. Bits
+are a uint16, the lowest for the first lane. And for words of 64 bits ``lowest(word)``, the place of the lowest that is set, and ``count(word)``.
 """
 import operator
 from typing import Any
@@ -26,8 +26,8 @@ _FLOAT = ir.FloatType()
 _VECTOR = ir.VectorType(_FLOAT, WIDTH)
 _BITS = ir.IntType(WIDTH)
 _MASK = ir.VectorType(ir.IntType(1), WIDTH)
-# multiply and add may be one instruction, and a sum may be taken in any order
-_FAST = ('contract', 'reassoc', 'nsz')
+# multiply and add may be one instruction
+_FLAGS = ('contract', 'nsz')
 
 
 class _Lanes(types.Type):  # type: ignore[misc]
@@ -83,21 +83,21 @@ def splat(typing: Any, value: Any) -> Any:
 
 
 @intrinsic
-def where(typing: Any, bits: Any, lanes: Any) -> Any:
-    """Return the lanes whose bit is set, the lowest for the first, and zero in the others."""
+def add_where(typing: Any, bits: Any, a: Any, b: Any) -> Any:
+    """Return a + b in the lanes whose bit is set, and a in the others."""
     def generate(context: Any, builder: Any, _: Any, arguments: Any) -> Any:
-        chosen = builder.bitcast(builder.trunc(arguments[0], _BITS), _MASK)
-        return builder.select(chosen, arguments[1], ir.Constant(_VECTOR, None))
-    return LANES(types.uint64, LANES), generate
+        bits, a, b = arguments
+        chosen = builder.bitcast(bits, _MASK)
+        return builder.select(chosen, builder.fadd(a, b, flags=_FLAGS), a)
+    return LANES(types.uint16, LANES, LANES), generate
 
 
 @intrinsic
 def at_most(typing: Any, a: Any, b: Any) -> Any:
-    """Return a bit a lane, the lowest for the first: whether a <= b; never for NaN."""
+    """Return the bits of a <= b; never for NaN."""
     def generate(context: Any, builder: Any, _: Any, arguments: Any) -> Any:
-        bits = builder.bitcast(builder.fcmp_ordered('<=', *arguments), _BITS)
-        return builder.zext(bits, ir.IntType(64))
-    return types.uint64(LANES, LANES), generate
+        return builder.bitcast(builder.fcmp_ordered('<=', *arguments), _BITS)
+    return types.uint16(LANES, LANES), generate
 
 
 @intrinsic
@@ -106,7 +106,7 @@ def total(typing: Any, lanes: Any) -> Any:
     def generate(context: Any, builder: Any, _: Any, arguments: Any) -> Any:
         add = builder.module.declare_intrinsic(
             f'llvm.vector.reduce.fadd.v{WIDTH}f32', fnty=ir.FunctionType(_FLOAT, [_FLOAT, _VECTOR]))
-        return builder.call(add, [ir.Constant(_FLOAT, -0.0), arguments[0]], fastmath=_FAST)
+        return builder.call(add, [ir.Constant(_FLOAT, -0.0), arguments[0]], fastmath=('reassoc',))
     return types.float32(LANES), generate
 
 
@@ -115,7 +115,7 @@ def _operator(of: Any, instruction: str) -> None:
     @intrinsic
     def operate(typing: Any, a: Any, b: Any) -> Any:
         def generate(context: Any, builder: Any, _: Any, arguments: Any) -> Any:
-            return getattr(builder, instruction)(*arguments, flags=_FAST)
+            return getattr(builder, instruction)(*arguments, flags=_FLAGS)
         return LANES(LANES, LANES), generate
 
     @overload(of, strict=False)    # or annotations would have to agree
@@ -125,7 +125,7 @@ def _operator(of: Any, instruction: str) -> None:
         return None
 
 
-for _of, _instruction in ((operator.add, 'fadd'), (operator.iadd, 'fadd'), (operator.sub, 'fsub'), (operator.mul, 'fmul')):
+for _of, _instruction in ((operator.add, 'fadd'), (operator.sub, 'fsub'), (operator.mul, 'fmul')):
     _operator(_of, _instruction)
 
 

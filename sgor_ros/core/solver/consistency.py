@@ -5,17 +5,18 @@ m_l^T W_m m_j, with the rows of M' as vectors of 0 and 1, where m_l and M_s* let
 on in blocks of 64, one bit each: first ``support``, m_l^T W_m for all keys of the block at once,
 then its sum over the ones of m_j.
 """
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.lanes import add_where
 from ..common.lanes import load
 from ..common.lanes import splat
 from ..common.lanes import store
 from ..common.lanes import total
-from ..common.lanes import where
 from ..common.threads import shared
 from ..matching.correspondences import Correspondences
 from ..scan.labels import labels_agree
@@ -78,42 +79,54 @@ def filter_groups(correspondences: Correspondences, graph: ConsistencyGraph, gro
     semantics : {'loose', 'hard', 'none'}
         See `SgorConfig`.
     """
-    filtered = FilteredGroups(np.full((len(groups.keys), keep), -1, np.int64),
-                              np.zeros((len(groups.keys), keep), np.float32))
+    count, n = len(groups.keys), len(correspondences)
+    filtered = FilteredGroups(np.full((count, keep), -1, np.int64),
+                              np.zeros((count, keep), np.float32))
     agreement = label_agreement(correspondences, semantics)
-    words = -(-len(correspondences) // 64)
+    words = -(-n // 64)
     support = np.empty((BLOCK, 64 * words), np.float32)
-    for first in range(0, len(groups.keys), BLOCK):
-        block = slice(first, first + BLOCK)
-        keys = groups.keys[block]
-        near, wanted = np.zeros((2, len(correspondences)), np.uint64)
-        _mark_keys(graph.start, graph.index, correspondences.source, keys,
+    for block in _neighbouring(correspondences.source[groups.keys], np.arange(count)):
+        near, wanted = np.zeros((2, n), np.uint64)
+        _mark_keys(graph.start, graph.index, correspondences.source, groups.keys[block],
                    groups.squared_reach[block], *agreement, near, wanted)
         rows = np.flatnonzero(wanted)
         bits = np.zeros((len(rows), words), np.uint64)
         shared(_mark_rows, len(rows), graph.start, graph.index, rows, bits)
-        asked = np.flatnonzero(np.unpackbits(np.bitwise_or.reduce(bits, axis=0).view(np.uint8),
-                                             bitorder='little'))
+        # where any of these rows has a one
+        asked = np.bitwise_or.reduce(bits, axis=0)
         if graph.reach > graph.sigma_d:
-            _support_afar(correspondences, graph, near, asked, support[:len(keys)])
+            _support_afar(correspondences, graph, near, asked, support)
         else:
-            shared(_support, len(asked), graph.start, graph.index, graph.weight, near, asked,
-                   support[:len(keys)])
-        shared(_choose, len(keys), support, rows, wanted[rows], bits, filtered.kept[block],
-               filtered.scores[block])
+            shared(_support, 4 * words, graph.start, graph.index, graph.weight,
+                   near.view(np.uint16), asked, support)
+        shared(_choose, len(block), support, rows, wanted[rows], bits.view(np.uint16), block,
+               filtered.kept, filtered.scores)
     return filtered
 
 
+def _neighbouring(points: NDArray[np.float64], keys: NDArray[np.intp]
+                  ) -> Iterator[NDArray[np.intp]]:
+    """Divide the keys into blocks of neighbours, for these share what is consistent with them."""
+    if len(keys) <= BLOCK:
+        yield keys
+        return
+    axis = np.ptp(points[keys], axis=0).argmax()
+    order = keys[np.argsort(points[keys, axis], kind='stable')]
+    half = BLOCK * -(-len(keys) // (2 * BLOCK))
+    yield from _neighbouring(points, order[:half])
+    yield from _neighbouring(points, order[half:])
+
+
 def _support_afar(correspondences: Correspondences, graph: ConsistencyGraph,
-                  near: NDArray[np.uint64], asked: NDArray[np.intp],
+                  near: NDArray[np.uint64], asked: NDArray[np.uint64],
                   support: NDArray[np.float32]) -> None:
     """Write the support where W_m reaches beyond the graph: weigh what is near a key anew."""
     middle = [points.mean(axis=0) for points in (correspondences.source, correspondences.target)]
     both = np.hstack((correspondences.source - middle[0], correspondences.target - middle[1]))
     some = np.flatnonzero(near)
-    shared(_weigh_support, len(asked), both, both[some],
+    shared(_weigh_support, 4 * len(asked), both, both[some],
            lanes_of(both[some, :3], both[some, 3:]), prefilter_limit(graph.reach), graph.reach,
-           weight_table(graph.sigma_d, graph.reach), near[some], asked, support)
+           weight_table(graph.sigma_d, graph.reach), near[some].view(np.uint16), asked, support)
 
 
 @numba.njit(cache=True, nogil=True)
@@ -147,61 +160,78 @@ def _mark_rows(first, last, start, index, rows, bits):  # type: ignore[no-untype
 @numba.njit(cache=True, nogil=True)
 def _support(first, last, start, index, weight, near, asked,  # type: ignore[no-untyped-def]
              support):
-    """Write columns of the support of all keys, from the rows of the graph."""
-    lanes = np.empty(BLOCK, np.float32)
-    for r in range(U64(first), U64(last)):
-        b = U64(asked[r])
-        one = two = three = four = splat(np.float32(0.0))
-        for e in range(start[b], start[b + U64(1)]):
-            keys = near[index[e]]
-            w = splat(weight[e])
-            one += where(keys, w)
-            two += where(keys >> U64(16), w)
-            three += where(keys >> U64(32), w)
-            four += where(keys >> U64(48), w)
-        _write_column(one, two, three, four, lanes, b, support)
+    """Write columns of the support of all keys, sixteen a task, from the rows of the graph."""
+    square = np.empty((16, BLOCK), np.float32)
+    for part in range(U64(first), U64(last)):
+        wanted = asked.view(np.uint16)[part]
+        for c in range(U64(16)):
+            if not (wanted >> c) & 1:
+                continue
+            b = U64(16) * part + c
+            one = two = three = four = splat(np.float32(0.0))
+            for e in range(start[b], start[b + U64(1)]):
+                at, w = U64(4) * U64(index[e]), splat(weight[e])
+                one = add_where(near[at], one, w)
+                two = add_where(near[at + U64(1)], two, w)
+                three = add_where(near[at + U64(2)], three, w)
+                four = add_where(near[at + U64(3)], four, w)
+            _put(square[c], one, two, three, four)
+        if wanted:
+            _transpose(square, U64(16) * part, support)
 
 
 @numba.njit(cache=True, nogil=True, inline='always')
-def _write_column(one, two, three, four, lanes, b, support):  # type: ignore[no-untyped-def]
+def _put(lanes, one, two, three, four):  # type: ignore[no-untyped-def]
     store(lanes, U64(0), one)
     store(lanes, U64(16), two)
     store(lanes, U64(32), three)
     store(lanes, U64(48), four)
-    for g in range(U64(len(support))):
-        support[g, b] = lanes[g]
+
+
+@numba.njit(cache=True, nogil=True)
+def _transpose(square, at, support):  # type: ignore[no-untyped-def]
+    """Write sixteen columns at once: one by one each element would touch a line of the cache."""
+    for g in range(U64(BLOCK)):
+        for c in range(U64(16)):
+            support[g, at + c] = square[c, g]
 
 
 @numba.njit(cache=True, nogil=True, error_model='numpy')
 def _weigh_support(first, last, both, some, columns, limit, reach,  # type: ignore[no-untyped-def]
                    table, near, asked, support):
-    """Write columns of the support of all keys from some matches, those near a key."""
-    lanes = np.empty(BLOCK, np.float32)
+    """Write columns of the support of all keys, from all matches near one of these."""
+    square = np.empty((16, BLOCK), np.float32)
     row = np.empty(columns.shape[1] // 64, np.uint64)
     places = np.empty(len(some), np.uint32)
     gap, other = np.empty(len(some)), np.empty(len(some))
     per_metre, last_cell = (len(table) - 1) / reach, len(table) - 2.0
-    for r in range(U64(first), U64(last)):
-        b = U64(asked[r])
-        px, py, pz, qx, qy, qz = both[b]
-        mark_row(columns, 0, np.float32(px), np.float32(py), np.float32(pz), np.float32(qx),
-                 np.float32(qy), np.float32(qz), limit, row)
-        found = places_of_bits(row, 0, places)
-        measure(some, places, found, px, py, pz, qx, qy, qz, gap, other)
-        one = two = three = four = splat(np.float32(0.0))
-        for k in range(found):
-            if gap[k] <= reach:
-                keys = near[places[k]]
-                w = splat(weigh(gap[k], per_metre, last_cell, table))
-                one += where(keys, w)
-                two += where(keys >> U64(16), w)
-                three += where(keys >> U64(32), w)
-                four += where(keys >> U64(48), w)
-        _write_column(one, two, three, four, lanes, b, support)
+    for part in range(U64(first), U64(last)):
+        wanted = asked.view(np.uint16)[part]
+        for c in range(U64(16)):
+            if not (wanted >> c) & 1:
+                continue
+            px, py, pz, qx, qy, qz = both[U64(16) * part + c]
+            mark_row(columns, 0, np.float32(px), np.float32(py), np.float32(pz), np.float32(qx),
+                     np.float32(qy), np.float32(qz), limit, row)
+            found = places_of_bits(row, 0, places)
+            measure(some, places, found, px, py, pz, qx, qy, qz, gap, other)
+            one = two = three = four = splat(np.float32(0.0))
+            for k in range(found):
+                value = weigh(gap[k], per_metre, last_cell, table)
+                at = U64(4) * U64(places[k])
+                w = splat(value if gap[k] <= reach else np.float32(0.0))
+                one = add_where(near[at], one, w)
+                two = add_where(near[at + U64(1)], two, w)
+                three = add_where(near[at + U64(2)], three, w)
+                four = add_where(near[at + U64(3)], four, w)
+            _put(square[c], one, two, three, four)
+        if wanted:
+            _transpose(square, U64(16) * part, support)
 
 
 @numba.njit(cache=True, nogil=True)
-def _choose(first, last, support, rows, wanted, bits, kept, scores):  # type: ignore[no-untyped-def]
+def _choose(first, last, support, rows, wanted, bits, block, kept,  # type: ignore[no-untyped-def]
+            scores):
     """Sum the support of each key over the ones of each row that it may keep."""
     for g in range(U64(first), U64(last)):
         own = support[g]
@@ -209,13 +239,14 @@ def _choose(first, last, support, rows, wanted, bits, kept, scores):  # type: ig
             if (wanted[r] >> g) & U64(1):
                 row = bits[r]
                 one = two = three = four = splat(np.float32(0.0))
-                for w in range(U64(len(row))):
-                    word, at = row[w], w * U64(64)
-                    one += where(word, load(own, at))
-                    two += where(word >> U64(16), load(own, at + U64(16)))
-                    three += where(word >> U64(32), load(own, at + U64(32)))
-                    four += where(word >> U64(48), load(own, at + U64(48)))
-                _insert(total((one + two) + (three + four)), rows[r], scores[g], kept[g])
+                for part in range(U64(0), U64(len(row)), U64(4)):
+                    at = U64(16) * part
+                    one = add_where(row[part], one, load(own, at))
+                    two = add_where(row[part + U64(1)], two, load(own, at + U64(16)))
+                    three = add_where(row[part + U64(2)], three, load(own, at + U64(32)))
+                    four = add_where(row[part + U64(3)], four, load(own, at + U64(48)))
+                _insert(total((one + two) + (three + four)), rows[r], scores[block[g]],
+                        kept[block[g]])
 
 
 @numba.njit(cache=True, nogil=True)

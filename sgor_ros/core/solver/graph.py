@@ -191,17 +191,15 @@ def mark_row(columns, from_word, px, py, pz, qx, qy, qz, limit, row):  # type: i
     px, py, pz = splat(px), splat(py), splat(pz)
     qx, qy, qz = splat(qx), splat(qy), splat(qz)
     most = splat(limit)
-    for w in range(U64(from_word), U64(len(row))):
-        word = U64(0)
-        for part in range(U64(0), U64(64), U64(16)):
-            j = w * U64(64) + part
-            x, y, z = load(ax, j) - px, load(ay, j) - py, load(az, j) - pz
-            p = x * x + y * y + z * z
-            x, y, z = load(bx, j) - qx, load(by, j) - qy, load(bz, j) - qz
-            q = x * x + y * y + z * z
-            gap = p - q
-            word |= at_most(gap * gap, most * (p + q)) << part
-        row[w] = word
+    parts = row.view(np.uint16)
+    for part in range(U64(4) * U64(from_word), U64(len(parts))):
+        j = U64(16) * part
+        x, y, z = load(ax, j) - px, load(ay, j) - py, load(az, j) - pz
+        p = x * x + y * y + z * z
+        x, y, z = load(bx, j) - qx, load(by, j) - qy, load(bz, j) - qz
+        q = x * x + y * y + z * z
+        gap = p - q
+        parts[part] = at_most(gap * gap, most * (p + q))
 
 
 @numba.njit(cache=True, nogil=True)

@@ -15,8 +15,6 @@ POWER_ITERATIONS = 10
 """As PointDSC; the order of the keys has settled by then."""
 MOST_VISITS, FEWEST_GROUPS = 1e8, 20
 """Edges to visit for all seed rows, some tenths of a second; and the groups that remain."""
-BINS = 1024
-"""Of the histogram that selects the k-th nearest."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,8 +26,8 @@ class Groups:
     keys : (L,) uint32
         Key correspondences G^k, the strongest first; fewer than asked for in a dense graph.
     squared_reach : (L,) float64
-        Squared distance from each key to its k-th nearest correspondence on the source, itself
-        the first, m^2: a group is all up to there.
+        A group is all correspondences with a squared distance on the source up to this from the
+        key, m^2: the k nearest, itself the first, and what is as far as the last of them.
     """
 
     keys: NDArray[np.uint32]
@@ -118,14 +116,17 @@ def _spread(points, order, count, spacing):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)
 def _squared_reach(first, last, columns, keys, k, reach):  # type: ignore[no-untyped-def]
-    """Write the k-th smallest squared distance to each key: for large k faster than a tree."""
+    """Write how far the k nearest of each key reach: for large k faster than a tree."""
     n = columns.shape[1]
+    squared = np.empty(n)
+    most = 1e-9
+    for a in range(3):
+        most += 1.001 * (columns[a].max() - columns[a].min())**2
     for g in range(U64(first), U64(last)):
         x, y, z = columns[:, keys[g]]
-        squared = np.empty(n)
         for i in range(n):
             squared[i] = squared_distance(columns[0, i], columns[1, i], columns[2, i], x, y, z)
-        reach[g] = _kth_smallest(squared, k)
+        reach[g] = _bound_of_nearest(squared, k, most)
 
 
 @numba.njit(cache=True, nogil=True, inline='always')
@@ -135,23 +136,26 @@ def squared_distance(ax, ay, az, bx, by, bz):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)
-def _kth_smallest(values, k):  # type: ignore[no-untyped-def]
-    """Select by a histogram first, so that only one bin of it is sorted."""
-    top = values.max()
-    if top == 0:
-        return top
-    scale = (BINS - 1) / top
-    count = np.zeros(BINS, np.int64)
-    for v in values:
-        count[U64(v * scale)] += 1
-    before, at = 0, 0
-    while before + count[at] < k:
-        before += count[at]
-        at += 1
-    inside = np.empty(count[at])
-    n = 0
-    for v in values:
-        if U64(v * scale) == at:
-            inside[n] = v
-            n += 1
-    return np.sort(inside)[k - before - 1]
+def _bound_of_nearest(squared, k, most):  # type: ignore[no-untyped-def]
+    """Halve the range up to `most` until k values are within; vectors count fast."""
+    low, high, within = 0.0, most, len(squared)
+    if _count_within(squared, low) >= k:
+        return low
+    while within != k:
+        middle = 0.5 * (low + high)
+        if middle <= low or middle >= high:    # several at the same distance
+            break
+        count = _count_within(squared, middle)
+        if count < k:
+            low = middle
+        else:
+            high, within = middle, count
+    return high
+
+
+@numba.njit(cache=True, nogil=True)
+def _count_within(values, bound):  # type: ignore[no-untyped-def]
+    count = 0
+    for i in range(len(values)):
+        count += values[i] <= bound
+    return count
