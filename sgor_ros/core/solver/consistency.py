@@ -23,12 +23,10 @@ from ..scan.labels import labels_agree
 from .graph import ConsistencyGraph
 from .graph import lanes_of
 from .graph import mark_row
-from .graph import measure
 from .graph import places_of_bits
 from .graph import prefilter_limit
 from .graph import U64
 from .graph import weigh
-from .graph import weight_table
 from .grouping import Groups
 from .grouping import squared_distance
 
@@ -92,13 +90,12 @@ def filter_groups(correspondences: Correspondences, graph: ConsistencyGraph, gro
         rows = np.flatnonzero(wanted)
         bits = np.zeros((len(rows), words), np.uint64)
         shared(_mark_rows, len(rows), graph.start, graph.index, rows, bits)
-        # where any of these rows has a one
-        asked = np.bitwise_or.reduce(bits, axis=0)
         if graph.reach > graph.sigma_d:
-            _support_afar(correspondences, graph, near, asked, support)
+            _support_afar(correspondences, graph, near, rows, wanted[rows], support)
         else:
             shared(_support, 4 * words, graph.start, graph.index, graph.weight,
-                   near.view(np.uint16), asked, support)
+                   near.view(np.uint16), np.bitwise_or.reduce(bits, axis=0).view(np.uint16),
+                   support)
         shared(_choose, len(block), support, rows, wanted[rows], bits.view(np.uint16), block,
                filtered.kept, filtered.scores)
     return filtered
@@ -118,15 +115,17 @@ def _neighbouring(points: NDArray[np.float64], keys: NDArray[np.intp]
 
 
 def _support_afar(correspondences: Correspondences, graph: ConsistencyGraph,
-                  near: NDArray[np.uint64], asked: NDArray[np.uint64],
+                  near: NDArray[np.uint64], rows: NDArray[np.intp], wanted: NDArray[np.uint64],
                   support: NDArray[np.float32]) -> None:
     """Write the support where W_m reaches beyond the graph: weigh what is near a key anew."""
-    middle = [points.mean(axis=0) for points in (correspondences.source, correspondences.target)]
-    both = np.hstack((correspondences.source - middle[0], correspondences.target - middle[1]))
+    p, q = correspondences.source, correspondences.target
+    both = np.hstack((p - p.mean(axis=0), q - q.mean(axis=0)))
     some = np.flatnonzero(near)
-    shared(_weigh_support, 4 * len(asked), both, both[some],
-           lanes_of(both[some, :3], both[some, 3:]), prefilter_limit(graph.reach), graph.reach,
-           weight_table(graph.sigma_d, graph.reach), near[some].view(np.uint16), asked, support)
+    asked = np.zeros(-(-len(p) // 16) * 16, np.uint64)
+    _mark_asked(graph.start, graph.index, rows, wanted, asked)
+    shared(_weigh_support, len(asked) // 16, both, both[some],
+           lanes_of(both[some, :3], both[some, 3:]), prefilter_limit(graph.reach), graph.sigma_d,
+           graph.reach, near[some], asked, support)
 
 
 @numba.njit(cache=True, nogil=True)
@@ -158,12 +157,21 @@ def _mark_rows(first, last, start, index, rows, bits):  # type: ignore[no-untype
 
 
 @numba.njit(cache=True, nogil=True)
+def _mark_asked(start, index, rows, wanted, asked):  # type: ignore[no-untyped-def]
+    """Set bit g where a row that key g may keep has a one: nothing else of its support counts."""
+    for r in range(U64(len(rows))):
+        i, keys = U64(rows[r]), wanted[r]
+        for k in range(start[i], start[i + U64(1)]):
+            asked[index[k]] |= keys
+
+
+@numba.njit(cache=True, nogil=True)
 def _support(first, last, start, index, weight, near, asked,  # type: ignore[no-untyped-def]
              support):
     """Write columns of the support of all keys, sixteen a task, from the rows of the graph."""
     square = np.empty((16, BLOCK), np.float32)
     for part in range(U64(first), U64(last)):
-        wanted = asked.view(np.uint16)[part]
+        wanted = asked[part]
         for c in range(U64(16)):
             if not (wanted >> c) & 1:
                 continue
@@ -196,37 +204,40 @@ def _transpose(square, at, support):  # type: ignore[no-untyped-def]
             support[g, at + c] = square[c, g]
 
 
-@numba.njit(cache=True, nogil=True, error_model='numpy')
-def _weigh_support(first, last, both, some, columns, limit, reach,  # type: ignore[no-untyped-def]
-                   table, near, asked, support):
+@numba.njit(cache=True, nogil=True)
+def _weigh_support(first, last, both, some, columns, limit, sigma_d,  # type: ignore[no-untyped-def]
+                   reach, near, asked, support):
     """Write columns of the support of all keys, from all matches near one of these."""
     square = np.empty((16, BLOCK), np.float32)
+    lanes = near.view(np.uint16)
     row = np.empty(columns.shape[1] // 64, np.uint64)
     places = np.empty(len(some), np.uint32)
-    gap, other = np.empty(len(some)), np.empty(len(some))
-    per_metre, last_cell = (len(table) - 1) / reach, len(table) - 2.0
+    squared, other = np.empty(len(some)), np.empty(len(some))
+    weight = np.empty(len(some), np.float32)
     for part in range(U64(first), U64(last)):
-        wanted = asked.view(np.uint16)[part]
         for c in range(U64(16)):
-            if not (wanted >> c) & 1:
+            b = U64(16) * part + c
+            if not asked[b]:
                 continue
-            px, py, pz, qx, qy, qz = both[U64(16) * part + c]
+            px, py, pz, qx, qy, qz = both[b]
             mark_row(columns, 0, np.float32(px), np.float32(py), np.float32(pz), np.float32(qx),
                      np.float32(qy), np.float32(qz), limit, row)
-            found = places_of_bits(row, 0, places)
-            measure(some, places, found, px, py, pz, qx, qy, qz, gap, other)
+            found = U64(0)
+            for k in range(places_of_bits(row, 0, places)):
+                # only what is near a key that asks here
+                places[found] = places[k]
+                found += U64((near[places[k]] & asked[b]) != 0)
+            weigh(some, places, found, px, py, pz, qx, qy, qz, sigma_d, reach, squared, other,
+                  weight)
             one = two = three = four = splat(np.float32(0.0))
             for k in range(found):
-                value = weigh(gap[k], per_metre, last_cell, table)
-                at = U64(4) * U64(places[k])
-                w = splat(value if gap[k] <= reach else np.float32(0.0))
-                one = add_where(near[at], one, w)
-                two = add_where(near[at + U64(1)], two, w)
-                three = add_where(near[at + U64(2)], three, w)
-                four = add_where(near[at + U64(3)], four, w)
+                at, w = U64(4) * U64(places[k]), splat(weight[k])
+                one = add_where(lanes[at], one, w)
+                two = add_where(lanes[at + U64(1)], two, w)
+                three = add_where(lanes[at + U64(2)], three, w)
+                four = add_where(lanes[at + U64(3)], four, w)
             _put(square[c], one, two, three, four)
-        if wanted:
-            _transpose(square, U64(16) * part, support)
+        _transpose(square, U64(16) * part, support)
 
 
 @numba.njit(cache=True, nogil=True)

@@ -27,14 +27,15 @@ from ..scan.voxels import thin
 PREFILTER_SLACK = 1e-3
 """Metres: float32 finds the candidate pairs, float64 decides. In a scan of 100 m the former errs
 by some 1e-5."""
-STEPS = 1024
-"""Of the table of W_m for each sigma_d; between them it is linear, off by 1e-7 at the most."""
 MOST_EDGES = 2**25
 """A fifth of a gigabyte; with more, and most matches right, some of them do."""
 SAMPLE = 1000
 """Correspondences that tell beforehand how many edges there will be."""
 BAND_PAIRS, FEWEST_BANDS, MOST_BANDS = 2**21, 4, 64
 """Candidates of so many pairs fit into the cache of a core."""
+
+ROOT = 64
+"""Of W_m, that a short series gives; six times squared."""
 
 U64 = np.uint64
 _ONE = U64(1)
@@ -137,7 +138,6 @@ def _upper(p: NDArray[np.float64], q: NDArray[np.float64], nodes: int, config: S
         others[thin(n, nodes)] = False
         columns[:, :n][:, others] = np.nan
     both = np.hstack((p, q))
-    table = weight_table(config.sigma_d, config.sigma_d)
     limit = prefilter_limit(config.sigma_d)
     count = min(max(n * n // BAND_PAIRS // 2, FEWEST_BANDS), MOST_BANDS)
     # rows get shorter, so bands get wider, to cost the same
@@ -152,8 +152,7 @@ def _upper(p: NDArray[np.float64], q: NDArray[np.float64], nodes: int, config: S
             candidates = _mark(rows[b], columns, limit, bits)
             index = np.empty(candidates, np.uint16 if n <= 2**16 else np.uint32)
             weight = np.empty(candidates, np.float32)
-            found = _weigh(rows[b], both, bits, config.sigma_d, table, length, below[b], index,
-                           weight)
+            found = _keep(rows[b], both, bits, config.sigma_d, length, below[b], index, weight)
             bands[b] = _Band(rows[b], length, index[:found], weight[:found])
 
     shared(find, count)
@@ -174,13 +173,6 @@ def prefilter_limit(reach: float) -> np.float32:
     where a pair is longer than the reach.
     """
     return np.float32(2 * (reach + PREFILTER_SLACK)**2)
-
-
-def weight_table(sigma_d: float, reach: float) -> NDArray[np.float64]:
-    """Return W_m (Eq. 8) for differences from 0 to `reach`, `STEPS` for each sigma_d."""
-    steps = math.ceil(STEPS * reach / sigma_d)
-    table: NDArray[np.float64] = np.exp(-0.5 * (np.linspace(0, reach, steps + 1) / sigma_d)**2)
-    return table
 
 
 @numba.njit(cache=True, nogil=True)
@@ -231,50 +223,58 @@ def places_of_bits(row, from_word, places):  # type: ignore[no-untyped-def]
     return found
 
 
-@numba.njit(cache=True, nogil=True, error_model='numpy')
-def measure(both, places, count, px, py, pz, qx, qy, qz, gap, other):  # type: ignore[no-untyped-def]
-    """Write d_ij (Eq. 5) from one match to the first `count` of some places."""
+@numba.njit(cache=True, nogil=True, error_model='numpy', fastmath={'contract'})
+def weigh(both, places, count, px, py, pz, qx, qy, qz, sigma_d,  # type: ignore[no-untyped-def]
+          reach, squared, other, weight):
+    """Write d_ij^2 (Eq. 5) from one match to the first `count` of some places, and W_m (Eq. 8)."""
     for k in range(U64(count)):
         j = places[k]
         x, y, z = both[j, 0] - px, both[j, 1] - py, both[j, 2] - pz
-        gap[k] = x * x + y * y + z * z
+        squared[k] = x * x + y * y + z * z
         x, y, z = both[j, 3] - qx, both[j, 4] - qy, both[j, 5] - qz
         other[k] = x * x + y * y + z * z
-    # the root alone: vectors
-    for k in range(count):
-        gap[k] = abs(math.sqrt(gap[k]) - math.sqrt(other[k]))
+    # without branches and calls, for vectors
+    limit, scale = reach * reach, -0.5 / (sigma_d * sigma_d * ROOT)
+    for k in range(U64(count)):
+        p, q = squared[k], other[k]
+        # (a - b)^2 = a^2 + b^2 - 2 ab, with one root and some 1e-12 lost
+        d = max(p + q - 2.0 * math.sqrt(p * q), 0.0)
+        x = d * scale
+        # of exp(64 x) the 64th root as a series, off by 1e-11 up to eight sigma_d
+        e = 1 + x * (1 + x * (1 / 2 + x * (1 / 6 + x * (1 / 24 + x * (
+            1 / 120 + x * (1 / 720 + x * (1 / 5040 + x * (1 / 40320))))))))
+        e *= e
+        e *= e
+        e *= e
+        e *= e
+        e *= e
+        e *= e
+        squared[k] = d
+        weight[k] = np.float32(e if d <= limit else 0.0)
 
 
-@numba.njit(cache=True, nogil=True, inline='always')
-def weigh(d, per_metre, last_cell, table):  # type: ignore[no-untyped-def]
-    """Return W_m of a difference up to the end of the table."""
-    at = d * per_metre
-    cell = U64(min(at, last_cell))
-    return np.float32(table[cell] + (at - cell) * (table[cell + _ONE] - table[cell]))
-
-
-@numba.njit(cache=True, nogil=True, error_model='numpy')
-def _weigh(first, both, bits, sigma_d, table, length, below, index,  # type: ignore[no-untyped-def]
-           weight):
+@numba.njit(cache=True, nogil=True)
+def _keep(first, both, bits, sigma_d, length, below, index, weight):  # type: ignore[no-untyped-def]
     """Write the consistent ones of the candidates, row after row; return how many."""
     n = len(both)
-    places, gap, other = np.empty(n, np.uint32), np.empty(n), np.empty(n)
-    per_metre, last_cell = (len(table) - 1) / sigma_d, len(table) - 2.0
+    places = np.empty(n, np.uint32)
+    squared, other, near_weight = np.empty(n), np.empty(n), np.empty(n, np.float32)
     at = U64(0)
     for r in range(len(bits)):
         i = first + r
         near = places_of_bits(bits[r], i // 64, places)
         px, py, pz, qx, qy, qz = both[i]
-        measure(both, places, near, px, py, pz, qx, qy, qz, gap, other)
+        weigh(both, places, near, px, py, pz, qx, qy, qz, sigma_d, sigma_d, squared, other,
+              near_weight)
         begin = at
         for k in range(near):
             # written anyhow, and kept where consistent: no branch to mispredict
             j = places[k]
             index[at] = j
-            weight[at] = weigh(gap[k], per_metre, last_cell, table)
-            consistent = gap[k] <= sigma_d
-            at += U64(consistent)
-            below[j] += U64(consistent)
+            weight[at] = near_weight[k]
+            consistent = U64(squared[k] <= sigma_d * sigma_d)
+            at += consistent
+            below[j] += consistent
         length[r] = at - begin
         if length[r]:
             below[i] -= _ONE    # itself

@@ -137,17 +137,25 @@ def squared_distance(ax, ay, az, bx, by, bz):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)
 def _bound_of_nearest(squared, k, most):  # type: ignore[no-untyped-def]
-    """Halve the range up to `most` until k values are within; vectors count fast."""
-    low, high, within = 0.0, most, len(squared)
-    if _count_within(squared, low) >= k:
+    """Narrow the range up to `most` until k values are within; vectors count fast."""
+    low, high = 0.0, most
+    below, within = _count_within(squared, low), len(squared)
+    if below >= k:
         return low
+    halve = False
     while within != k:
-        middle = 0.5 * (low + high)
-        if middle <= low or middle >= high:    # several at the same distance
-            break
+        # where it should be if all were evenly spread, and every second time in the middle
+        share = 0.5 if halve else (k - below + 0.5) / (within - below + 1.0)
+        middle = low + share * (high - low)
+        if middle <= low or middle >= high:
+            if halve:    # several at the same distance
+                break
+            halve = True
+            continue
+        halve = not halve
         count = _count_within(squared, middle)
         if count < k:
-            low = middle
+            low, below = middle, count
         else:
             high, within = middle, count
     return high
