@@ -1,24 +1,29 @@
 """Sixteen float32 side by side, for compiled loops whose branches are bits.
 
 LLVM makes vectors of plain loops, but not where a comparison is to become a bit, or a bit is to
-choose what is added: such loops say here what they mean. Whatever the processor has (AVX-512, AVX2,
-NEON), LLVM finds instructions for it.
+choose what is added: such loops say here what they mean. Whatever the processor has (AVX-512,
+AVX2, NEON), LLVM finds instructions for it.
 
 All are for compiled code: ``splat(x)``, ``load(array, at)`` and ``store(array, at, lanes)`` with
 any alignment and no check of bounds; ``+``, ``-``, ``*``; ``add_where(bits, a, b)``, a + b where
-a bit is set and else a; ``at_most(a, b)``, the bits of a <= b; ``total(lanes)``. Bits
-are a uint16, the lowest for the first lane. And for words of 64 bits ``lowest(word)``, the place of the lowest that is set, and ``count(word)``.
+a bit is set and else a; ``at_most(a, b)``, the bits of a <= b; ``total(lanes)``. Bits are a
+uint16, the lowest for the first lane. And for words of 64 bits ``lowest(word)``, the place of the
+lowest that is set, and ``count(word)``.
 """
+from collections.abc import Callable
 import operator
 from typing import Any
 
 from llvmlite import ir
+from numba import extending
 from numba import types
 from numba.core.datamodel import models
-from numba.extending import intrinsic
 from numba.extending import overload
 from numba.extending import register_model
 from numba.np.arrayobj import make_array
+
+# its own types want the first argument, which numba fills in, of whoever calls
+intrinsic: Callable[[Callable[..., Any]], Any] = extending.intrinsic
 
 WIDTH = 16
 
@@ -30,7 +35,7 @@ _MASK = ir.VectorType(ir.IntType(1), WIDTH)
 _FLAGS = ('contract', 'nsz')
 
 
-class _Lanes(types.Type):  # type: ignore[misc]
+class _Lanes(types.Type):
     def __init__(self) -> None:
         super().__init__('Lanes')
 
@@ -39,15 +44,15 @@ LANES = _Lanes()
 
 
 @register_model(_Lanes)
-class _Model(models.PrimitiveModel):  # type: ignore[misc]
+class _Model(models.PrimitiveModel):
     def __init__(self, manager: Any, kind: Any) -> None:
-        super().__init__(manager, kind, _VECTOR)
+        super().__init__(manager, kind, _VECTOR)  # type: ignore[no-untyped-call]
 
 
 def _place(context: Any, builder: Any, kind: Any, array: Any, at: Any) -> Any:
     """Return a pointer to the lanes from an element on."""
-    data = make_array(kind)(context, builder, array).data
-    return builder.bitcast(builder.gep(data, [at]), _VECTOR.as_pointer())
+    view = make_array(kind)(context, builder, array)  # type: ignore[no-untyped-call]
+    return builder.bitcast(builder.gep(view.data, [at]), _VECTOR.as_pointer())
 
 
 @intrinsic
@@ -104,8 +109,8 @@ def at_most(typing: Any, a: Any, b: Any) -> Any:
 def total(typing: Any, lanes: Any) -> Any:
     """Return the sum of all lanes."""
     def generate(context: Any, builder: Any, _: Any, arguments: Any) -> Any:
-        add = builder.module.declare_intrinsic(
-            f'llvm.vector.reduce.fadd.v{WIDTH}f32', fnty=ir.FunctionType(_FLOAT, [_FLOAT, _VECTOR]))
+        kind = ir.FunctionType(_FLOAT, [_FLOAT, _VECTOR])
+        add = builder.module.declare_intrinsic(f'llvm.vector.reduce.fadd.v{WIDTH}f32', fnty=kind)
         return builder.call(add, [ir.Constant(_FLOAT, -0.0), arguments[0]], fastmath=('reassoc',))
     return types.float32(LANES), generate
 

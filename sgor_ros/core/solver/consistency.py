@@ -15,8 +15,8 @@ from .graph import U64
 from .grouping import Groups
 from .grouping import squared_distance
 from .seed_rows import add_support
-from .seed_rows import Block
 from .seed_rows import BLOCK
+from .seed_rows import Block
 from .seed_rows import blocks_of
 from .seed_rows import choose
 

@@ -62,11 +62,12 @@ def blocks_of(points: NDArray[np.float64], keys: NDArray[np.intp]) -> Iterator[N
 
 def add_support(correspondences: Correspondences, graph: ConsistencyGraph, block: Block,
                 support: NDArray[np.float32]) -> None:
-    """Write m_l^T W_m for the keys of a block, (64, N), where they ask for it."""
+    """Write m_l^T W_m for the keys of a block, (64, N), at least where they ask for it."""
     near, wanted, _ = block
     tasks = support.shape[1] // 16
     if graph.reach <= graph.sigma_d:
-        shared(_support, tasks, graph.start, graph.index, graph.weight, near, wanted, support)
+        shared(_support, tasks, graph.start, graph.index, graph.weight,
+               near.view(np.uint16), support)
         return
     # W_m reaches beyond the graph: what is near a key is weighed anew
     p, q = correspondences.source, correspondences.target
@@ -96,22 +97,14 @@ def _asking(start, index, wanted, b):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)
-def _support(first, last, start, index, weight, near, wanted,  # type: ignore[no-untyped-def]
-             support):
+def _support(first, last, start, index, weight, near, support):  # type: ignore[no-untyped-def]
     """Write sixteen columns a task, from the rows of the graph."""
-    n = U64(len(near))
+    n = U64(len(start)) - U64(1)
     square = np.zeros((16, BLOCK), np.float32)
-    places, weights = np.empty(n + U64(1), np.uint32), np.empty(n + U64(1), np.float32)
     for part in range(U64(first), U64(last)):
         for b in range(U64(16) * part, min(U64(16) * part + U64(16), n)):
-            keys = _asking(start, index, wanted, b)
-            if keys:
-                found = U64(0)
-                for e in range(start[b], start[b + U64(1)]):
-                    # written anyhow: no branch to mispredict
-                    places[found], weights[found] = index[e], weight[e]
-                    found += U64((near[index[e]] & keys) != U64(0))
-                _add(near.view(np.uint16), places, weights, found, square[b - U64(16) * part])
+            row = slice(start[b], start[b + U64(1)])
+            _add(near, index[row], weight[row], row.stop - row.start, square[b - U64(16) * part])
         _transpose(square, U64(16) * part, support)
 
 

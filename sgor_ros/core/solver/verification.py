@@ -100,13 +100,13 @@ def near_counts(T: NDArray[np.float64], source: NDArray[np.float64], target: NDA
 def _squared_distances(T, source, target, squared):  # type: ignore[no-untyped-def]
     """Write how far each match lies apart, squared; (3, N) columns, so that there are vectors."""
     # all out of the loop: what is written might be a part of it
-    (a, b, c, d), (e, f, g, h), (k, l, m, n) = T[0], T[1], T[2]
+    (a, b, c, x0), (d, e, f, y0), (g, h, k, z0) = T[0], T[1], T[2]
     px, py, pz = source[0], source[1], source[2]
     qx, qy, qz = target[0], target[1], target[2]
     for i in range(len(squared)):
-        x = a * px[i] + b * py[i] + c * pz[i] + d - qx[i]
-        y = e * px[i] + f * py[i] + g * pz[i] + h - qy[i]
-        z = k * px[i] + l * py[i] + m * pz[i] + n - qz[i]
+        x = a * px[i] + b * py[i] + c * pz[i] + x0 - qx[i]
+        y = d * px[i] + e * py[i] + f * pz[i] + y0 - qy[i]
+        z = g * px[i] + h * py[i] + k * pz[i] + z0 - qz[i]
         squared[i] = x * x + y * y + z * z
 
 
