@@ -29,7 +29,8 @@ setup(
     data_files=[
         ('share/ament_index/resource_index/packages', ['resource/sgor_ros']),
         (SHARE, ['package.xml']),
-        (f'{SHARE}/config', glob('config/*.yaml') + glob('config/*.rviz')),
+        (f'{SHARE}/config', glob('config/*.yaml') + glob('config/*.rviz')
+         + glob('config/*.json')),
         (f'{SHARE}/config/labels', glob('config/labels/*.yaml')),
         (f'{SHARE}/launch', glob('launch/*.py')),
     ],
@@ -53,6 +54,8 @@ setup(
         'benchmark': [*OPEN3D, 'kiss-icp', 'kiss_matcher'],
         # to run what docs/pose_graph.md shows
         'slam': ['gtsam>=4.3', 'g2opy'],
+        # --visualize; needs numpy 2, which the messages of an installed Jazzy do not take
+        'visualize': ['rerun-sdk>=0.41'],
         'test': ['pytest'],
         'dev': [
             'mypy',

@@ -79,6 +79,8 @@ say "making $venv (one to three minutes)"
 "$venv/bin/python" -m pip install -qq --disable-pip-version-check 'gtsam>=4.3' g2opy "${pins[@]}" ||
     say 'no GTSAM or g2o for this machine: the tests of docs/pose_graph.md are skipped'
 if [ "${#pins[@]}" -eq 0 ]; then
+    "$venv/bin/python" -m pip install -qq --disable-pip-version-check --editable '.[visualize]' ||
+        say 'no rerun for this machine: the tests of --visualize are skipped'
     say 'building tf2_msgs for the tests of /tf (a minute)'
     bash scripts/tf2_msgs.sh "$venv/bin/python" "$venv/tf2_msgs" ||
         say 'it could not be built (cmake and a C++ compiler?): the tests of /tf are skipped'

@@ -7,6 +7,12 @@ from .cache import choose_cache_folder
 
 if TYPE_CHECKING:
     from .api import *  # noqa: F403
+    from .io.datasets import Drive as Drive
+    from .io.datasets import open_drive as open_drive
+    from .io.datasets import open_drives as open_drives
+
+DATASETS = ('Drive', 'open_drive', 'open_drives')
+"""What reads files, which the rest of the interface does not."""
 
 choose_cache_folder()
 
@@ -19,6 +25,10 @@ def __getattr__(name: str) -> Any:
     """
     if name == '__all__' or not name.startswith('_'):
         api = import_module('.api', __name__)
-        if name in ('__all__', *api.__all__):
+        if name == '__all__':
+            return [*api.__all__, *DATASETS]
+        if name in api.__all__:
             return getattr(api, name)
+        if name in DATASETS:
+            return getattr(import_module('.io.datasets', __name__), name)
     raise AttributeError(f'module {__name__!r} has no attribute {name!r}')

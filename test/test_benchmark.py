@@ -12,7 +12,6 @@ from sgor_ros.evaluation import pairs as pairing
 from sgor_ros.evaluation import report
 from sgor_ros.evaluation import solver
 from sgor_ros.evaluation.metrics import THREE_SIGMA
-from sgor_ros.evaluation.pairs import Drive
 from sgor_ros.evaluation.pairs import Pair
 from sgor_ros.evaluation.rivals import Answer
 from sgor_ros.evaluation.run import Method
@@ -20,6 +19,8 @@ from sgor_ros.evaluation.run import Row
 from sgor_ros.evaluation.run import run_pairs
 from sgor_ros.evaluation.run import sample_of
 from sgor_ros.evaluation.run import sgor
+from sgor_ros.io.datasets import Drive
+from sgor_ros.io.datasets import open_drives
 from sgor_ros.io.trajectories import write_kitti
 
 # camera axes: x right, y down, z ahead; and a lever arm
@@ -69,7 +70,7 @@ def median_distance(pair, T):
 
 
 def test_drives_of_a_user_have_poses_of_the_sensor(sequences_folder, street):
-    drives = pairing.read_drives(sequences_folder)
+    drives = open_drives(sequences_folder)
     assert [drive.name for drive in drives] == ['sequences/00', 'sequences/01']
     assert [len(drive.frames) for drive in drives] == [4, 2]
     truth = np.linalg.inv(street[0][2]) @ street[3][2]
@@ -80,7 +81,7 @@ def test_drives_of_a_user_have_poses_of_the_sensor(sequences_folder, street):
 
 
 def test_near_pairs_are_those_within_reach(sequences_folder, street):
-    drive = pairing.read_drives(sequences_folder / 'sequences')[0]
+    drive = open_drives(sequences_folder / 'sequences')[0]
     pairs = pairing.near_pairs([drive], 2.0)    # scans are 1.5 m apart
     assert [(p.source.name[-1], p.target.name[-1]) for p in pairs] == [
         ('1', '0'), ('2', '1'), ('3', '2')]
@@ -90,12 +91,12 @@ def test_near_pairs_are_those_within_reach(sequences_folder, street):
 
 
 def test_a_drive_may_be_the_folder_itself(sequences_folder):
-    drive, = pairing.read_drives(sequences_folder / 'sequences/01')
+    drive, = open_drives(sequences_folder / 'sequences/01')
     assert drive.name == '01'
 
 
 def test_real_drives_and_pairs_lie_on_each_other(data_folder):
-    drives = {drive.name: drive for drive in pairing.read_drives(data_folder)}
+    drives = {drive.name: drive for drive in open_drives(data_folder)}
     assert {'kitti/00', 'kitti/05', 'kitti/08', 'nuscenes'} == set(drives)
     conventions = {name: {f.label_convention for f in drive.frames}
                    for name, drive in drives.items()}
@@ -153,7 +154,7 @@ def test_wrong_pairs_are_of_different_places():
 
 
 def test_the_truth_of_a_turned_pair_maps_the_same_points(sequences_folder):
-    pair = pairing.near_pairs(pairing.read_drives(sequences_folder), 36.0)[2]
+    pair = pairing.near_pairs(open_drives(sequences_folder), 36.0)[2]
     sample, truth = sample_of(pair, seed=3)
     scan = pair.source.read().points.astype(float)
     before = scan @ pair.T_target_source[:3, :3].T + pair.T_target_source[:3, 3]
@@ -174,7 +175,7 @@ def test_random_labels_replace_the_share_that_was_asked_for():
 
 @pytest.mark.parametrize('heights_known', [True, False])
 def test_heights_count_only_where_they_are_known(sequences_folder, heights_known):
-    pair = pairing.near_pairs(pairing.read_drives(sequences_folder), 36.0)[0]
+    pair = pairing.near_pairs(open_drives(sequences_folder), 36.0)[0]
     pair = Pair(pair.source, pair.target, pair.T_target_source, heights_known=heights_known)
     too_high = sample_of(pair, seed=0)[1]
     too_high[2, 3] += 1.0
@@ -222,7 +223,7 @@ def test_thresholds_refuse_below_and_accept_from_there_on():
 
 
 def test_sgor_refused_for_few_inliers_passes_no_threshold(sequences_folder):
-    pair = pairing.near_pairs(pairing.read_drives(sequences_folder), 36.0)[0]
+    pair = pairing.near_pairs(open_drives(sequences_folder), 36.0)[0]
     sample, _ = sample_of(pair, seed=0)
     answer = sgor('m', SgorConfig(min_inliers=10000)).run(sample)
     assert not answer.valid
@@ -269,7 +270,7 @@ def test_pairs_command(sequences_folder, tmp_path, capsys):
 
 
 def test_peak_memory_is_of_each_method_alone(sequences_folder, tmp_path):
-    pair = pairing.near_pairs(pairing.read_drives(sequences_folder), 36.0)[0]
+    pair = pairing.near_pairs(open_drives(sequences_folder), 36.0)[0]
     sample, _ = sample_of(pair, seed=0)
     from sgor_ros.evaluation.run import peak_memory_mb
     ballast = np.ones(60_000_000)    # 480 MB here, none of them there
@@ -367,7 +368,7 @@ def test_solver_command(tmp_path):
 
 
 @pytest.mark.parametrize(('arguments', 'message'), [
-    (['pairs', '--data', 'nowhere'], 'nowhere: no folder velodyne'),
+    (['pairs', '--data', 'nowhere'], 'nowhere: no such file or folder'),
     (['pairs', '--data', '{data}', '--methods', 'icp'], '--methods icp: not one of sgor, paper'),
     (['pairs', '--data', '{data}', '--max-distance', '0.1'], 'no pairs within 0.1 m'),
     (['wrong', '--data', '{data}/sequences/01'], 'no wrong pairs'),

@@ -13,6 +13,7 @@ from sgor_ros.core.common import se3
 from sgor_ros.core.common.settings import InputError
 from sgor_ros.evaluation.track import track_errors
 from sgor_ros.io.bags import BagReader
+from sgor_ros.world import simulate
 
 
 def run_demo(*arguments):
@@ -102,3 +103,30 @@ def test_track_is_laid_on_the_truth_at_its_first_pose():
     assert errors.drift.translation_percent == pytest.approx(3.0)
     # 0.3 m to the left of a start that looks along y
     assert errors.estimate[2, :3, 3] == pytest.approx([4.7, 16, 7])
+
+
+def test_demo_plays_a_recorded_drive(tmp_path):
+    """A few scans of the street as a folder: no labels and a truth that is not the identity."""
+    drive = tmp_path / 'drive'
+    (drive / 'velodyne').mkdir(parents=True)
+    poses = []
+    for i, (_, points, _, pose) in enumerate(simulate(4, seed=1)):
+        np.hstack((points, points[:, :1])).astype(np.float32).tofile(
+            drive / 'velodyne' / f'{i:06d}.bin')
+        poses.append(pose[:3].ravel())
+    np.savetxt(drive / 'poses.txt', poses)
+    # forth and back: six scans of four
+    done = run_demo('--data', drive, '--scans', 6, '--rate', 0.7, '--out', tmp_path / 'demo')
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert re.search(r'processed +6\n', done.stdout)
+    assert float(re.search(r'TE of consecutive pairs +median ([\d.]+) cm', done.stdout)[1]) < 5
+    assert (tmp_path / 'demo/trajectory.png').stat().st_size > 10_000
+    assert not (tmp_path / 'demo/bag').exists()
+
+
+def test_demo_says_why_a_folder_is_no_drive(tmp_path):
+    (tmp_path / 'velodyne').mkdir()
+    np.ones((10, 4), np.float32).tofile(tmp_path / 'velodyne/0.bin')
+    done = run_demo('--data', tmp_path, '--out', tmp_path / 'demo')
+    assert done.returncode == 2
+    assert 'no poses.txt' in done.stderr

@@ -98,11 +98,11 @@ def broken(sequence, what):
         (sequence / 'velodyne/000006.bin').write_bytes(b'12345')
         return '5 bytes are no points'
     if what == 'times short':
-        (sequence / 'times.txt').write_text('0\n1\n2\n')
-        return 'times.txt: 3 rows, but the scans go up to number 6'
+        (sequence / 'times.txt').write_text('0\n1\n')
+        return 'times.txt: 2 rows for 3 scans, which go up to number 6'
     if what == 'times missing':
         (sequence / 'times.txt').unlink()
-        return 'times.txt: no times'
+        return 'times.txt: no such file'
     np.savetxt(sequence / 'poses.txt', np.tile(np.eye(4)[:3].reshape(-1), (10, 1)))
     return 'calib.txt: no row Tr'
 

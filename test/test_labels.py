@@ -14,7 +14,7 @@ from sgor_ros.core.scan.labels import label_convention
 
 CAR, ROAD, BUILDING, VEGETATION, POLE = 1, 9, 13, 15, 18    # classes inside
 CONVENTIONS = ('semantickitti', 'semantickitti_train', 'nuscenes', 'nuscenes16',
-               'autoware_frnet', 'autoware_ptv3', 'carla')
+               'autoware_frnet', 'autoware_ptv3', 'carla', 'rellis')
 # as they publish them, id after id from 0
 PUBLISHED = {
     'nuscenes16': 'void barrier bicycle bus car construction_vehicle motorcycle pedestrian '
@@ -74,10 +74,11 @@ def test_nuscenes_ego_vehicle_and_movers():
 
 
 @pytest.mark.parametrize('ids', [
-    (40, 8, 24, 11, 0, 8, 1), (10, 0, 17, 4, 5, 0, 14), (50, 12, 28, 15, 3, 11, 3),
-    (70, 14, 30, 16, 4, 10, 9), (30, 5, 2, 7, 17, 4, 12), (11, 1, 14, 2, 16, 3, 19),
-    (18, 3, 23, 10, 9, 1, 15), (48, 10, 26, 13, 2, None, 2), (72, 16, 27, 14, None, None, 10),
-    (51, 13, 9, 1, None, 6, 5), (80, 17, None, None, None, 12, 6)])
+    (40, 8, 24, 11, 0, 8, 1, 10), (10, 0, 17, 4, 5, 0, 14, None), (50, 12, 28, 15, 3, 11, 3, 12),
+    (70, 14, 30, 16, 4, 10, 9, 4), (30, 5, 2, 7, 17, 4, 12, 17), (11, 1, 14, 2, 16, 3, 19, None),
+    (18, 3, 23, 10, 9, 1, 15, None), (48, 10, 26, 13, 2, None, 2, None),
+    (72, 16, 27, 14, None, None, 10, 3), (51, 13, 9, 1, None, 6, 5, 18),
+    (80, 17, None, None, None, 12, 6, 5)])
 def test_the_same_thing_is_the_same_class_in_all_conventions(ids):
     """So that a scan of one convention meets one of another, with the same name."""
     found = {decode(name, [i])[0][0] for name, i in zip(CONVENTIONS, ids, strict=True)

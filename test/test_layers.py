@@ -9,11 +9,11 @@ import pytest
 import sgor_ros
 
 PACKAGE = Path(sgor_ros.__file__).parent
-SHELLS = {'io', 'ros', 'commands', 'evaluation'}
+SHELLS = {'io', 'visualize', 'ros', 'commands', 'evaluation'}
 ROS = {'rclpy', 'ament_index_python', 'launch', 'launch_ros', 'sensor_msgs', 'nav_msgs',
        'geometry_msgs', 'visualization_msgs', 'diagnostic_msgs', 'std_msgs', 'std_srvs',
        'builtin_interfaces', 'rcl_interfaces', 'tf2_msgs', 'tf2_ros'}
-FILES = {'rosbags', 'matplotlib', 'tqdm', 'argparse'}
+FILES = {'rosbags', 'rerun', 'matplotlib', 'tqdm', 'argparse'}
 
 # module or folder -> what it may import of the package besides itself
 MAY_IMPORT = {
@@ -24,7 +24,8 @@ MAY_IMPORT = {
     'io': {'core', 'tracker'},
     'evaluation': {'core', 'tracker', 'io'},
     'ros': {'core', 'tracker', 'io'},
-    'commands': {'core', 'tracker', 'io', 'evaluation', 'ros', 'world'},
+    'visualize': {'core', 'tracker'},
+    'commands': {'core', 'tracker', 'io', 'evaluation', 'ros', 'visualize', 'world'},
     'world': set(),
 }
 

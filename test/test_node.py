@@ -1,5 +1,6 @@
 """The node as users have it: a process of its own, real DDS, real clouds."""
 from importlib.util import find_spec
+import json
 from pathlib import Path
 import subprocess
 import sys
@@ -16,6 +17,7 @@ from ros_helpers import status
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import Marker
 from visualization_msgs.msg import MarkerArray
+import yaml
 
 from sgor_ros import SgorConfig
 from sgor_ros import TrackerConfig
@@ -25,6 +27,7 @@ from sgor_ros.ros.parameters import yaml_files
 from sgor_ros.ros.player import Domain
 from sgor_ros.ros.player import NodeProcess
 from sgor_ros.ros.player import SETTLING_S
+from sgor_ros.ros.types import ros_type
 from sgor_ros.world import Lidar
 from sgor_ros.world import simulate
 
@@ -501,3 +504,33 @@ def test_yaml_files_are_what_the_settings_say():
     for name, content in yaml_files().items():
         assert (ROOT / 'config' / name).read_text() == content, (
             'run python -m sgor_ros.ros.parameters config')
+
+
+def test_layouts_of_rviz_and_foxglove_show_its_topics(partner):
+    names = ('sgor_node', '/')
+    topics = {**dict(partner.node.get_publisher_names_and_types_by_node(*names)),
+              **dict(partner.node.get_subscriber_names_and_types_by_node(*names))}
+    kinds = {name: kind for name, (kind, *_) in topics.items()}
+    rviz = yaml.safe_load((ROOT / 'config/sgor.rviz').read_text())['Visualization Manager']
+    shown = {'/' + display['Topic']['Value']: display['Class'].rpartition('/')[2]
+             for display in rviz['Displays'] if 'Topic' in display}
+    assert shown == {'/points': 'PointCloud2', '/odometry': 'Odometry',
+                     '/correspondences': 'MarkerArray'}
+    for topic, display in shown.items():
+        assert kinds[topic].rpartition('/')[2] == display
+    assert rviz['Global Options']['Fixed Frame'] == NodeConfig().odom_frame
+    panels = json.loads((ROOT / 'config/sgor.foxglove.json').read_text())['configById']
+    assert shown.keys() <= panels['3D!sgor']['topics'].keys() <= kinds.keys()
+    assert panels['3D!sgor']['followTf'] == NodeConfig().odom_frame
+    told = panels['DiagnosticStatusPanel!sgor']['topicToRender']
+    assert kinds[told] == 'diagnostic_msgs/msg/DiagnosticArray'
+    paths = [path['value'] for panel in panels.values() for path in panel.get('paths', ())]
+    assert len(paths) == 4
+    for path in paths:
+        topic, *fields = path.split('.')
+        value = ros_type(kinds[topic])()
+        for field in fields:
+            name, _, index = field.partition('[')
+            value = getattr(value, name)
+            value = value[int(index.rstrip(']'))] if index else value
+        assert isinstance(value, float)

@@ -11,7 +11,7 @@ from sgor_ros import SgorConfig
 from sgor_ros.evaluation.metrics import inlier_scores
 from sgor_ros.evaluation.metrics import rotation_error_deg
 from sgor_ros.evaluation.metrics import translation_error_m
-from sgor_ros.evaluation.pairs import read_drives
+from sgor_ros.io.datasets import open_drives
 from sgor_ros.io.scans import read_scan
 
 CONVENTIONS = {'labels': 'semantickitti', 'predicted_labels': 'semantickitti_train'}
@@ -111,7 +111,7 @@ def test_matches_of_3dmatch(data_folder):
 @pytest.fixture(scope='module')
 def nuscenes(data_folder):
     """Return the first five prepared scans of nuScenes, their config and T_world_sensor."""
-    drive, = read_drives(data_folder / 'nuscenes')
+    drive, = open_drives(data_folder / 'nuscenes')
     config = SgorConfig(label_convention='nuscenes')
     scans = [preprocess(frame.read(), config) for frame in drive.frames[:5]]
     return scans, config, drive.T_world_sensor

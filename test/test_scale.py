@@ -14,7 +14,7 @@ from sgor_ros import SgorConfig
 from sgor_ros.core.scan.preprocessing import at_scale
 from sgor_ros.core.scan.scale import scale_of
 from sgor_ros.core.scan.scale import SMALLEST
-from sgor_ros.evaluation.pairs import read_drives
+from sgor_ros.io.datasets import open_drives
 from sgor_ros.io.scans import read_scan
 from sgor_ros.io.trajectories import read_kitti
 
@@ -71,7 +71,7 @@ def test_streets_are_of_scale_one_whatever_the_sensor(street, data_folder):
     """All beams, every fourth column, KITTI, every fourth point of it, and nuScenes."""
     scans = [SemanticScan(points[::step], labels[::step]) for points, labels, _ in street
              for step in (1, 4)]
-    for drive in read_drives(data_folder):
+    for drive in open_drives(data_folder):
         scans += [frame.read() for frame in drive.frames[::5]]
     scans += [SemanticScan(scan.points[::4]) for scan in scans[-5:]]
     assert {preprocess(scan).scale for scan in scans} == {1.0}

@@ -11,7 +11,7 @@ from sgor_ros import State
 from sgor_ros import Tracker
 from sgor_ros import TrackerConfig
 from sgor_ros.core.common import se3
-from sgor_ros.evaluation.pairs import read_drives
+from sgor_ros.io.datasets import open_drives
 
 PERIOD_NS = 100_000_000
 MODES = ('consecutive', 'keyframe')
@@ -75,7 +75,7 @@ def test_poses_are_those_of_the_first_scan(scans, street, mode):
 @pytest.mark.parametrize('mode', MODES)
 def test_real_scans(data_folder, mode):
     """Ten scans of KITTI 08: the end within 0.3 m and 1 degree, none failed."""
-    drive = next(d for d in read_drives(data_folder / 'kitti') if d.name.endswith('08'))
+    drive = next(d for d in open_drives(data_folder / 'kitti') if d.name.endswith('08'))
     results = track([frame.read() for frame in drive.frames[:10]], mode=mode)
     assert all(result.success for result in results)
     assert_near(results[-1].T_odom_sensor,

@@ -23,11 +23,12 @@ from ..evaluation import solver
 from ..evaluation import trust
 from ..evaluation.honesty_table import honesty_table
 from ..evaluation.honesty_table import RULE
-from ..evaluation.pairs import Drive
 from ..evaluation.pairs import Pair
 from ..evaluation.run import Method
 from ..evaluation.run import sgor
 from ..evaluation.trust_plots import plot_reliability
+from ..io.datasets import Drive
+from ..io.datasets import open_drives
 from .benchmark_options import benchmark_parser
 from .options import run
 from .scene_pairs import scene_drive
@@ -231,7 +232,7 @@ def _drives(arguments: Namespace) -> list[Drive]:
 
 
 def _data_drives(arguments: Namespace) -> list[Drive]:
-    return pairing.read_drives(arguments.data) if arguments.data else []
+    return open_drives(arguments.data) if arguments.data else []
 
 
 def _wants_world(arguments: Namespace) -> bool:

@@ -59,9 +59,9 @@ def benchmark_parser() -> ArgumentParser:
 def _add(commands: Any, name: str, what: str) -> ArgumentParser:
     command: ArgumentParser = commands.add_parser(name, help=what, description=what,
                                                   formatter_class=ArgumentDefaultsHelpFormatter)
-    command.add_argument('--data', type=Path, metavar='FOLDER', help='with folders velodyne, '
-                         'labels and poses.txt, itself or up to two levels below, as in '
-                         'SemanticKITTI; each drive a place of its own')
+    command.add_argument('--data', type=Path, metavar='FOLDER', help='of drives with poses, '
+                         'itself or up to two levels below, as in SemanticKITTI (other layouts: '
+                         'docs/data.md); each drive a place of its own')
     command.add_argument('--world', action='store_true', help='use the built-in world; default '
                          'where there is no --data')
     command.add_argument('--seed', type=int, default=0)

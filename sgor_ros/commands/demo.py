@@ -14,6 +14,7 @@ from rosbags.typesys import Stores
 from tqdm import tqdm
 
 from ..core.common.settings import InputError
+from ..core.config import SgorConfig
 from ..evaluation.track import track_errors
 from ..evaluation.track import TrackErrors
 from ..evaluation.track_plots import plot_against_truth
@@ -22,6 +23,8 @@ from ..io.bags import BagReader
 from ..io.bags import CLOUD_TYPE
 from ..io.messages import matrix_of
 from ..io.messages import stamp_ns_of
+from .recorded_drive import Recorded
+from .recorded_drive import recorded_drive
 from .world_bag import STREET
 from .world_bag import WorldMap
 from .world_bag import write_world_bag
@@ -69,6 +72,8 @@ def _parse(arguments: list[str] | None) -> argparse.Namespace:
     parser.add_argument('--seed', type=int, default=0, help='chooses the place and the noise')
     parser.add_argument('--place', default=STREET, metavar='KIND', help='or tunnel, corridor, '
                         'facade, garage_half_full, ...: a wrong one lists them all')
+    parser.add_argument('--data', type=Path, metavar='FOLDER', help='play this recorded drive '
+                        'instead of the built-in world: velodyne/*.bin and poses.txt, the truth')
     options = parser.parse_args(arguments)
     if options.scans < 2:
         parser.error(f'--scans {options.scans}: at least 2')
@@ -92,18 +97,21 @@ def _run(options: argparse.Namespace) -> int:
     except OSError as error:
         raise InputError(f'--out {out}: {error.strerror}') from error
     _say('starting sgor_node; the first start on a machine compiles, for a minute or two')
-    with closing(Domain()) as domain, NodeProcess(domain, out / 'node.log') as node:
-        drive, world = write_world_bag(out / 'bag', min(options.scans, BAG_SCANS), options.seed,
-                                       options.place)
-        with BagReader(out / 'bag') as reader:
-            clouds = [cloud.read()[2] for cloud in reader.clouds(reader.find_topic('label'))]
+    most = min(options.scans, BAG_SCANS)
+    recorded = recorded_drive(options.data, most) if options.data else None
+    convention = (recorded or SgorConfig()).label_convention
+    with closing(Domain()) as domain, NodeProcess(
+            domain, out / 'node.log', '-p', f'label_convention:={convention}') as node:
+        # while the node starts
+        recorded = recorded or _built_in(options, most)
+        drive = recorded.truth
         scans = list(forth_and_back(list(drive), options.scans))
         truth = {stamp_ns: drive[original] for original, stamp_ns in scans}
         with Player(domain) as player:
             player.wait_for_node(node.alive)
             _say(f'sgor_node is ready; playing {len(scans)} scans at {options.rate:g} Hz')
             memory = [node.memory_mb()]
-            stream = _restamped(clouds, list(drive), scans)
+            stream = _restamped(recorded.clouds, list(drive), scans)
             player.play(tqdm(stream, 'playing', len(scans), unit='scan', disable=None),
                         1 / options.rate, node.alive)
             last = scans[-1][1]
@@ -115,7 +123,15 @@ def _run(options: argparse.Namespace) -> int:
         code = node.stop()
     if not alive or code:
         return _fail(f'sgor_node ended with code {code}; see {node.log}')
-    return _compare(player, truth, world, memory, options)
+    return _compare(player, truth, recorded.world, memory, options)
+
+
+def _built_in(options: argparse.Namespace, scans: int) -> Recorded:
+    """Drive through the built-in world and read what the bag has of it."""
+    truth, world = write_world_bag(options.out / 'bag', scans, options.seed, options.place)
+    with BagReader(options.out / 'bag') as reader:
+        clouds = [cloud.read()[2] for cloud in reader.clouds(reader.find_topic('label'))]
+    return Recorded(truth, clouds, world, SgorConfig().label_convention)
 
 
 def forth_and_back(stamps_ns: list[int], count: int) -> Iterator[tuple[int, int]]:
@@ -171,7 +187,8 @@ def _compare(player: 'Player', truth: dict[int, Array], world: WorldMap, memory_
         _say(slowness(len(answered), len(sent), seconds, options.rate))
     plot_against_truth(out / 'trajectory.png', errors, np.array(list(truth.values())), world)
     plot_errors(out / 'errors.png', errors, np.array(answered), seconds, 1 / options.rate)
-    _say(f'pictures: {out}/trajectory.png, {out}/errors.png; bag: {out}/bag')
+    _say(f'pictures: {out}/trajectory.png, {out}/errors.png'
+         + ('' if options.data else f'; bag: {out}/bag'))
     processed, failed = int(counts['processed']), int(counts['failed'])
     if processed < LEAST_SHARE * (processed + failed):
         return _fail(f'{failed} of {processed + failed} registrations failed; '

@@ -15,6 +15,7 @@ import yaml
 from ..core.common.settings import InputError
 from ..core.common.settings import Setting
 from ..core.common.settings import Settings
+from ..visualize import VIEWER
 
 REFUSED = 2
 INTERRUPTED = 130
@@ -53,6 +54,12 @@ def add_params_file(to: ArgumentParser) -> None:
     """Add the option for a YAML file as ROS nodes take it."""
     to.add_argument('--params-file', type=Path, metavar='YAML', default=SUPPRESS,
                     help='settings in the format of ROS parameter files; options go before')
+
+
+def add_visualize(to: ArgumentParser) -> None:
+    """Add the option for a live look."""
+    to.add_argument('--visualize', nargs='?', const=VIEWER, default=None, metavar='FILE.rrd',
+                    help='write what rerun shows to this file; without a file open its viewer')
 
 
 def configured[S: Settings](start: S, arguments: Namespace, parameters: dict[str, Any]) -> S:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from .. import visualize
 from ..core.common import se3
 from ..core.config import SgorConfig
 from ..core.registration import register
@@ -20,6 +21,7 @@ from ..io.plots import plot_registration
 from ..io.scans import read_scan
 from .options import add_params_file
 from .options import add_settings
+from .options import add_visualize
 from .options import configured
 from .options import parser
 from .options import read_parameters
@@ -38,6 +40,8 @@ def register_files(arguments: Namespace) -> int:
     """Register and tell; 1 where the scans could not be registered."""
     config = configured(PRESETS[arguments.preset](), arguments,
                         read_parameters(arguments, SgorConfig.settings()))
+    if arguments.visualize is not None:
+        visualize.check(arguments.visualize)
     convention = arguments.target_label_convention or config.label_convention
     source = read_scan(arguments.source, arguments.source_labels)
     target = read_scan(arguments.target, arguments.target_labels)
@@ -51,6 +55,9 @@ def register_files(arguments: Namespace) -> int:
         arguments.json.write_text(json.dumps(_as_dict(result, arguments), indent=2) + '\n')
     if arguments.plot:
         _plot(arguments, source, target, result)
+    if arguments.visualize is not None:
+        with visualize.pair_view(arguments.visualize, config) as look:
+            look.show(source, target, result, _text(result))
     return 0 if result.success else FAILED
 
 
@@ -68,6 +75,7 @@ def _parser() -> ArgumentParser:
                          help='settings to start from')
     command.add_argument('--json', type=Path, metavar='FILE', help='write the result to')
     command.add_argument('--plot', type=Path, metavar='FILE', help='draw the result to (PNG)')
+    add_visualize(command)
     add_params_file(command)
     add_settings(command, 'settings (defaults are those of the preset outdoor)',
                  SgorConfig.settings())

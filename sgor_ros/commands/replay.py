@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
+from .. import visualize
 from ..core.common.settings import InputError
 from ..core.config import SgorConfig
 from ..core.scan.labels import label_convention
@@ -19,6 +20,9 @@ from ..core.warmup import warm_up
 from ..evaluation.track_plots import plot_track
 from ..io.bags import BagReader
 from ..io.bags import BagWriter
+from ..io.bags import is_bag
+from ..io.datasets import open_drive
+from ..io.datasets.clouds import DriveReader
 from ..io.environment import describe_environment
 from ..io.stream_config import StreamConfig
 from ..io.trajectories import write_kitti
@@ -27,6 +31,7 @@ from ..tracker import Tracker
 from ..tracker import TrackerConfig
 from .options import add_params_file
 from .options import add_settings
+from .options import add_visualize
 from .options import configured
 from .options import parser
 from .options import read_parameters
@@ -46,21 +51,30 @@ def replay(arguments: Namespace) -> int:
     parameters = read_parameters(arguments, [
         *SgorConfig.settings(), *TrackerConfig.settings(), *StreamConfig.settings()])
     stream = configured(StreamConfig(), arguments, parameters)
-    tracker = Tracker(configured(SgorConfig(), arguments, parameters),
+    drive = (None if is_bag(arguments.bag_path)
+             else open_drive(arguments.bag_path, arguments.sequence))
+    start = SgorConfig() if drive is None else SgorConfig(label_convention=drive.label_convention)
+    tracker = Tracker(configured(start, arguments, parameters),
                       configured(TrackerConfig(), arguments, parameters))
+    if arguments.visualize is not None:
+        visualize.check(arguments.visualize)
     label_convention(tracker.config.label_convention)
     output: Path = arguments.output or Path('out') / arguments.bag_path.stem
     warnings = Warnings()
     rows: list[Row] = []
     broken: InputError | None = None
     with ExitStack() as stack:
-        bag = stack.enter_context(BagReader(arguments.bag_path))
+        bag: BagReader | DriveReader = (
+            stack.enter_context(BagReader(arguments.bag_path)) if drive is None
+            else stack.enter_context(DriveReader(drive)))
         topic = arguments.topic or bag.find_topic(stream.label_field)
         clouds, expected = bag.clouds(topic), bag.cloud_topics()[topic]
         output.mkdir(parents=True, exist_ok=True)
         writer = stack.enter_context(BagWriter(output / 'bag')) if arguments.bag else None
         warm_up(tracker.config)
-        steps = Steps(tracker, stream, writer, warnings)
+        look = (None if arguments.visualize is None else stack.enter_context(
+            visualize.track_view(arguments.visualize, tracker.config)))
+        steps = Steps(tracker, stream, writer, warnings, look)
         try:
             for cloud in tqdm(clouds, total=expected, unit='scan', disable=None):
                 rows.append(steps.take(cloud))
@@ -81,14 +95,18 @@ def replay(arguments: Namespace) -> int:
 
 
 def _parser() -> ArgumentParser:
-    command = parser('Track the labelled clouds of a bag (ROS 2 mcap or sqlite3, ROS 1) and write '
+    command = parser('Track the labelled clouds of a bag (ROS 2 mcap or sqlite3, ROS 1), or the '
+                     'scans of a folder (SemanticKITTI and others, see docs/data.md), and write '
                      'trajectory.tum, trajectory_kitti.txt, summary.json and trajectory.png.')
-    command.add_argument('bag_path', type=Path, metavar='BAG')
+    command.add_argument('bag_path', type=Path, metavar='BAG', help='or folder of scans')
     command.add_argument('--topic', help='of the clouds; found where there is but one')
+    command.add_argument('--sequence', metavar='NAME', help='of the drives of a folder; found '
+                         'where there is but one')
     command.add_argument('--output', type=Path, metavar='FOLDER',
                          help='for the results; default: out/ and the name of the bag')
     command.add_argument('--bag', action='store_true',
                          help='also write a bag with /pose, /odometry and /correspondences')
+    add_visualize(command)
     add_params_file(command)
     add_settings(command, 'clouds and frames', StreamConfig.settings())
     add_settings(command, 'tracker', TrackerConfig.settings())

@@ -6,6 +6,7 @@ import math
 import sys
 import time
 from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +25,9 @@ from ..io.pointcloud2 import decode
 from ..io.stream_config import StreamConfig
 from ..tracker import TrackedScan
 from ..tracker import Tracker
+
+if TYPE_CHECKING:
+    from ..visualize.track import TrackView
 
 # then the terminal has seen enough; summary.json has them all
 PRINTED_WARNINGS = 20
@@ -76,6 +80,8 @@ class Steps:
     stream : StreamConfig
     writer : BagWriter or None
     warnings : Warnings
+    look : TrackView or None
+        Shows each scan.
 
     Raises
     ------
@@ -84,7 +90,7 @@ class Steps:
     """
 
     def __init__(self, tracker: Tracker, stream: StreamConfig, writer: BagWriter | None,
-                 warnings: Warnings) -> None:
+                 warnings: Warnings, look: 'TrackView | None' = None) -> None:
         if stream.base_frame and not stream.T_base_sensor:
             raise InputError(f'base_frame = {stream.base_frame!r}: the replay has no tf2 to look '
                              'it up, so it needs T_base_sensor')
@@ -94,6 +100,7 @@ class Steps:
         self._stream = stream
         self._writer = writer
         self._warnings = warnings
+        self._look = look
         self._odom_frame = OdomFrame()
 
     def take(self, cloud: RecordedCloud) -> Row:
@@ -109,6 +116,8 @@ class Steps:
             self._warnings.add(f'scan at {stamp_ns * 1e-9:.3f} s left out: {error}')
             return Row(stamp_ns, str(error))
         seconds = time.perf_counter() - start
+        if self._look:
+            self._look.show(scan, tracked)
         for text in tracked.warnings:
             self._warnings.add(text)
         if not tracked.success:

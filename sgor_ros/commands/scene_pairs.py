@@ -6,11 +6,11 @@ from numpy.typing import NDArray
 
 from ..core.common import se3
 from ..core.common.settings import InputError
-from ..evaluation.pairs import Drive
 from ..evaluation.pairs import drive_of
-from ..evaluation.pairs import Frame
 from ..evaluation.pairs import frame_in_memory
 from ..evaluation.pairs import Pair
+from ..io.datasets import Drive
+from ..io.datasets import Frame
 
 
 def scene_kinds(names: Sequence[str]) -> dict[str, bool]:

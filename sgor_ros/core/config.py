@@ -25,7 +25,7 @@ class SgorConfig(Settings):
     # scan -> semantic-geometric space (Sec. III-B)
     label_convention: str = setting(
         'semantickitti', 'What the label ids mean: semantickitti, semantickitti_train, nuscenes, '
-        'nuscenes16, autoware_frnet, autoware_ptv3, carla or the path of a YAML file')
+        'nuscenes16, autoware_frnet, autoware_ptv3, carla, rellis or the path of a YAML file')
     min_range: float = setting(
         1.0, 'Points nearer to the sensor are dropped', 'm', minimum=0.0, maximum=100.0)
     max_range: float = setting(

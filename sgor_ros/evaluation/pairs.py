@@ -1,6 +1,5 @@
 """What is registered to what: scans with known poses, right pairs and wrong pairs of them."""
 from collections import defaultdict
-from collections.abc import Callable
 from collections.abc import Iterable
 from collections.abc import Iterator
 from collections.abc import Sequence
@@ -16,62 +15,17 @@ from scipy.spatial import cKDTree
 
 from ..core.common import se3
 from ..core.common.settings import InputError
-from ..core.config import SgorConfig
 from ..core.scan.scan import SemanticScan
-from ..io.scans import read_scan
-from ..io.trajectories import read_kitti
+from ..io.datasets import Drive
+from ..io.datasets import Frame
+from ..io.datasets.semantickitti import frame
 
 Array = NDArray[np.float64]
-
-LABEL_FOLDERS = {'labels': 'semantickitti', 'predicted_labels': 'semantickitti_train'}
-"""Where labels lie beside `velodyne`, best first, and what 32-bit ids there mean."""
 
 NO_OVERLAP_M = 100.0
 """Scans of one drive farther apart than this see different places."""
 
 BAND_M = 10.0
-
-BYTES_PER_POINT = 16
-
-
-@dataclass(frozen=True, eq=False)
-class Frame:
-    """One scan of a drive.
-
-    Attributes
-    ----------
-    name : str
-    data_set : str
-        What it is counted under in tables.
-    label_convention : str
-    read : callable
-        Returns the `SemanticScan`.
-    """
-
-    name: str
-    data_set: str
-    label_convention: str
-    read: Callable[[], SemanticScan]
-
-
-@dataclass(frozen=True, eq=False)
-class Drive:
-    """Scans of one place in the order of recording; other drives are other places.
-
-    Attributes
-    ----------
-    name : str
-    frames : sequence of Frame
-    T_world_sensor : (N, 4, 4) float64 or None
-        True poses.
-    heights_known : bool
-        Whether the heights of the poses are as good as the rest.
-    """
-
-    name: str
-    frames: Sequence[Frame]
-    T_world_sensor: Array | None
-    heights_known: bool = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,72 +59,6 @@ class Pair:
         """Distance of the sensors; NaN for different drives."""
         return (float('nan') if self.T_target_source is None
                 else float(np.linalg.norm(self.T_target_source[:3, 3])))
-
-
-def read_drives(folder: Path) -> list[Drive]:
-    """Find the drives of a data folder: each folder that holds a folder ``velodyne``.
-
-    Beside ``velodyne/*.bin`` there may be ``labels`` or ``predicted_labels``, ``poses.txt``, and
-    ``calib.txt`` whose ``Tr`` maps LiDAR to camera where the poses are those of a camera.
-
-    Parameters
-    ----------
-    folder : Path
-        A drive itself, or the drives are one or two levels below.
-
-    Raises
-    ------
-    InputError
-        No drive there, or a file of one cannot be read.
-    """
-    found = [path.parent for level in ('', '*/', '*/*/')
-             for path in sorted(folder.glob(f'{level}velodyne')) if path.is_dir()]
-    if not found:
-        raise InputError(f'{folder}: no folder velodyne in it or in two levels below')
-    return [_read_drive(path, folder) for path in found]
-
-
-def _read_drive(path: Path, root: Path) -> Drive:
-    name = str(path.relative_to(root)) if path != root else path.resolve().name
-    frames = [frame(scan, _best_labels(scan), f'{name}/{scan.stem}')
-              for scan in sorted((path / 'velodyne').glob('*.bin'))]
-    if not frames:
-        raise InputError(f'{path}/velodyne: no .bin in it')
-    poses = None
-    if (path / 'poses.txt').is_file():
-        poses = _sensor_poses(path)
-        if len(poses) < len(frames):
-            raise InputError(f'{path}/poses.txt: {len(poses)} poses for {len(frames)} scans')
-    return Drive(name, frames, poses, frames[0].data_set != 'nuscenes')
-
-
-def frame(scan: Path, labels: Path | None, name: str) -> Frame:
-    """Describe a scan in files; what its labels mean follows from their folder and size."""
-    convention = SgorConfig().label_convention
-    if labels is not None and labels.is_file():
-        one_byte = labels.stat().st_size * BYTES_PER_POINT == scan.stat().st_size
-        convention = 'nuscenes' if one_byte else LABEL_FOLDERS[labels.parent.name]
-    data_set = 'nuscenes' if convention == 'nuscenes' else 'kitti'
-    return Frame(name, data_set, convention, partial(read_scan, scan, labels))
-
-
-def _best_labels(scan: Path) -> Path | None:
-    candidates = (scan.parents[1] / folder / f'{scan.stem}.label' for folder in LABEL_FOLDERS)
-    return next((path for path in candidates if path.is_file()), None)
-
-
-def _sensor_poses(path: Path) -> Array:
-    """Return the poses of the LiDAR, (N, 4, 4); camera poses are turned into them by Tr."""
-    poses = read_kitti(path / 'poses.txt')
-    if not (path / 'calib.txt').is_file():
-        return poses
-    rows = [line.split()[1:] for line in (path / 'calib.txt').read_text().splitlines()
-            if line.startswith('Tr')]
-    if not rows or len(rows[0]) != 12:
-        raise InputError(f'{path}/calib.txt: expected a line "Tr:" and 12 numbers')
-    T_camera_sensor = np.eye(4)
-    T_camera_sensor[:3] = np.array(rows[0], np.float64).reshape(3, 4)
-    return np.asarray(se3.inverse(T_camera_sensor) @ poses @ T_camera_sensor)
 
 
 def frame_in_memory(name: str, data_set: str, points: NDArray[np.float32],

@@ -14,13 +14,13 @@ from tqdm import tqdm
 from ..core.config import SgorConfig
 from ..core.scan.scan import SemanticScan
 from ..core.warmup import warm_up
+from ..io.datasets import Drive
 from ..tracker import TrackedScan
 from ..tracker import Tracker
 from ..tracker import TrackerConfig
 from .honesty import Said
 from .honesty import what_was_said
 from .metrics import KITTI_LENGTHS_M
-from .pairs import Drive
 from .rivals import kiss_icp
 from .rivals import scan_to_scan
 from .track import track_errors

@@ -9,6 +9,8 @@ from types import TracebackType
 from typing import Any
 from typing import Self
 
+import numpy as np
+from numpy.typing import NDArray
 from rosbags.highlevel import AnyReader
 from rosbags.interfaces import Connection
 from rosbags.rosbag2 import StoragePlugin
@@ -20,9 +22,21 @@ from rosbags.typesys import Stores
 from ..core.common.settings import InputError
 from .label_field import field_names
 from .label_field import label_field_of
+from .messages import matrix_of
 from .messages import stamp_ns_of
 
 CLOUD_TYPE = 'sensor_msgs/msg/PointCloud2'
+ODOMETRY_TYPE = 'nav_msgs/msg/Odometry'
+BAG_FILES = ('.mcap', '.db3', '.bag')
+
+
+def is_bag(path: str | Path) -> bool:
+    """Whether a path looks like a bag: a file of that name, or a folder with one."""
+    path = Path(path)
+    if not path.is_dir():
+        return path.suffix in BAG_FILES
+    return (path / 'metadata.yaml').is_file() or any(
+        file.suffix in BAG_FILES[:2] for file in path.iterdir())
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,8 +122,14 @@ class BagReader:
                              f'{", ".join(topics)}')
         return topics[0]
 
-    def clouds(self, topic: str) -> Iterator[RecordedCloud]:
+    def clouds(self, topic: str, at_ns: int | None = None) -> Iterator[RecordedCloud]:
         """Iterate over the clouds of a topic in the order of their recording.
+
+        Parameters
+        ----------
+        topic : str
+        at_ns : int, optional
+            Only those that were recorded at this time, nanoseconds.
 
         Raises
         ------
@@ -120,11 +140,22 @@ class BagReader:
             raise InputError(f'topic {topic}: no clouds in {self.path}; there are '
                              f'{", ".join(self.cloud_topics()) or "none"}')
         return self._iterate([c for c in self._reader.connections
-                              if c.topic == topic and c.msgtype == CLOUD_TYPE])
+                              if c.topic == topic and c.msgtype == CLOUD_TYPE], at_ns)
 
-    def _iterate(self, connections: list[Connection]) -> Iterator[RecordedCloud]:
+    def poses(self, topic: str) -> Iterator[tuple[int, NDArray[np.float64]]]:
+        """Iterate over the odometry of a topic, if there is any: stamp, (4, 4) pose."""
+        connections = [c for c in self._reader.connections
+                       if c.topic == topic and c.msgtype == ODOMETRY_TYPE]
         with _readable(self.path):
-            for _, time_ns, raw in self._reader.messages(connections):
+            for _, _, raw in self._reader.messages(connections) if connections else ():
+                message: Any = self._reader.deserialize(raw, ODOMETRY_TYPE)
+                yield stamp_ns_of(message.header), matrix_of(message.pose.pose)
+
+    def _iterate(self, connections: list[Connection], at_ns: int | None
+                 ) -> Iterator[RecordedCloud]:
+        stop = None if at_ns is None else at_ns + 1
+        with _readable(self.path):
+            for _, time_ns, raw in self._reader.messages(connections, at_ns, stop):
                 yield RecordedCloud(time_ns, partial(self._read, raw))
 
     def _is_labelled(self, topic: str, label_field: str) -> bool:

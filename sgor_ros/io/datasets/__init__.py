@@ -1,0 +1,93 @@
+"""Scans on disk, one file for each layout; which it is, is seen from the path."""
+from pathlib import Path
+from types import ModuleType
+
+from ...core.common.settings import InputError
+from . import bags
+from . import helipr
+from . import mulran
+from . import nuscenes
+from . import rellis
+from . import scans
+from . import semantickitti
+from .drive import Drive
+from .drive import Frame
+
+__all__ = ['Drive', 'Frame', 'open_drive', 'open_drives']
+
+LAYOUTS: tuple[ModuleType, ...] = (nuscenes, semantickitti, rellis, helipr, mulran)
+"""Those that the names of folders tell; whatever else holds scans is a folder of scans."""
+
+LEVELS = 2
+"""Drives are looked for so far below a folder."""
+
+
+def open_drive(path: str | Path, sequence: str | None = None) -> Drive:
+    """Open the scans of a path; which layout it is, is seen from the names in it.
+
+    Parameters
+    ----------
+    path : str or Path
+        A bag or a folder: a sequence of KITTI, SemanticKITTI, RELLIS-3D, MulRan or HeLiPR, a
+        download of nuScenes, or any folder of ``.bin``, ``.npz``, ``.pcd`` and ``.ply``.
+    sequence : str, optional
+        Which drive, where the path holds several: its name or the last part of it.
+
+    Returns
+    -------
+    Drive
+        Its scans are read when they are asked for.
+
+    Raises
+    ------
+    InputError
+        Nothing to read there, several drives and none chosen, or files that do not fit together.
+    """
+    found = open_drives(path)
+    if sequence is not None:
+        chosen = [drive for drive in found
+                  if sequence in (drive.name, drive.name.rpartition('/')[2])]
+        if len(chosen) == 1:
+            return chosen[0]
+        problem = f'no drive {sequence}' if not chosen else f'several drives {sequence}'
+    elif len(found) == 1:
+        return found[0]
+    else:
+        problem = 'several drives, choose one'
+    raise InputError(f'{path}: {problem}; there are {", ".join(drive.name for drive in found)}')
+
+
+def open_drives(path: str | Path) -> list[Drive]:
+    """Open all drives of a path, itself or up to two levels below; otherwise as `open_drive`."""
+    path = Path(path)
+    if bags.recognises(path):
+        return bags.drives(path, path.stem)
+    if not path.exists():
+        raise InputError(f'{path}: no such file or folder')
+    if not path.is_dir():
+        raise InputError(f'{path}: neither a bag nor a folder')
+    folders = _folders(path)
+    for layouts in (LAYOUTS, (scans,)):
+        found: list[Drive] = []
+        taken: list[Path] = []
+        for folder in folders:
+            layout = next((each for each in layouts if each.recognises(folder)), None)
+            if layout is not None and not any(folder.is_relative_to(above) for above in taken):
+                taken.append(folder)
+                found += layout.drives(folder, _name(folder, path))
+        if found:
+            return found
+    raise InputError(f'{path}: no folder velodyne in it or in {LEVELS} levels below, and nothing '
+                     f'else that is a drive: see docs/data.md')
+
+
+def _folders(path: Path) -> list[Path]:
+    """Return a folder and those below it, level by level."""
+    levels = [[path]]
+    for _ in range(LEVELS):
+        levels.append([child for folder in levels[-1] for child in sorted(folder.glob('*/'))])
+    return [folder for level in levels for folder in level]
+
+
+def _name(folder: Path, root: Path) -> str:
+    return str(folder.relative_to(root)) if folder != root else folder.resolve().name
