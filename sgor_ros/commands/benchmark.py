@@ -168,13 +168,17 @@ def sequence(arguments: Namespace) -> int:
 
 
 def solve(arguments: Namespace) -> int:
-    """Time the solver against the count of correspondences."""
+    """Time the solver on made-up matches and on those of the FPFH of real scans."""
     sets = [solver.made_up(count, arguments.inlier_share, arguments.seed)
             for count in arguments.counts]
     small = [matches for matches in sets if len(matches.source) <= arguments.dense_limit]
+    if arguments.data or arguments.world:
+        pairs = _right_pairs(arguments, _drives(arguments), arguments.pairs)
+        sets += solver.fpfh_matches(pairs, arguments.fpfh_matches)
     if arguments.data:
         sets += solver.real_matches(arguments.data)
-    rows = solver.run_solver(sets, _config(arguments), arguments.runs)
+    rows = solver.run_solver(sets, _config(arguments), arguments.runs,
+                             rivals=running.installed('kiss_matcher', _say))
     dense = _dense_reference()
     if dense is None:
         _say('no dense reference here: it is part of the tests, which are not installed')

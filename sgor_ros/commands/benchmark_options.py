@@ -33,9 +33,6 @@ def benchmark_parser() -> ArgumentParser:
                              'random and evenly over data sets and distances')
     three = _add(commands, 'ablation', 'every mechanism off, one at a time')
     three.add_argument('--pairs', type=_positive, default=200, help='right pairs, likewise')
-    for command in (one, two, three):
-        command.add_argument('--max-distance', type=float, default=36.0, metavar='M',
-                             help='between the sensors of a right pair')
     four = _add(commands, 'sequence', 'odometry: drift, time a scan, and '
                 'whether its covariance holds')
     four.add_argument('--scans', type=_count, default=120, help='of each drive, and of the '
@@ -46,13 +43,21 @@ def benchmark_parser() -> ArgumentParser:
     for command in (two, four):
         command.add_argument('--kinds', nargs='+', metavar='KIND', help='of those; default: all')
     four.add_argument('--speed', type=float, default=6.0, metavar='M/S', help='in the world')
-    five = _add(commands, 'solver', 'time of the solver against the count of matches')
+    five = _add(commands, 'solver', 'time of the solver on made-up matches, and on those of the '
+                'FPFH of your scans')
     five.add_argument('--counts', type=_positive, nargs='+',
-                      default=[500, 1000, 2000, 4000, 8000, 20000])
+                      default=[1000, 2000, 4000, 8000, 16000, 30000], help='of made-up matches')
+    five.add_argument('--pairs', type=_positive, default=8, help='of scans whose FPFH is matched, '
+                      'with --data or --world')
+    five.add_argument('--fpfh-matches', type=_positive, default=8000, metavar='COUNT',
+                      help='most of a pair')
     five.add_argument('--inlier-share', type=_share, default=0.02, help='of made-up matches')
     five.add_argument('--runs', type=_positive, default=20, help='for each time')
     five.add_argument('--dense-limit', type=_count, default=2000,
                       help='most matches for the dense reference')
+    for command in (one, two, three, five):
+        command.add_argument('--max-distance', type=float, default=36.0, metavar='M',
+                             help='between the sensors of a right pair')
     return top
 
 
