@@ -1,11 +1,11 @@
 """Compare the speed of two commits, in turns in one run: a history for whoever goes on.
 
-    python scripts/compare.py 1c5d096 HEAD --data ../shared/data
+    .venv/bin/python scripts/compare.py 1c5d096 . --data ../shared/data
 
-Each commit gets a worktree under ``out/compare`` (and keeps it, with what numba compiled) and a
-process of its own; both are asked in turns, so that what else the machine does slows both. The
-matches and scans are the same files for both, made by the checkout that this script is in. What is
-called exists since 1c5d096: `register_correspondences`, `preprocess` and `register`.
+Each commit is unpacked into ``out/compare`` (where it stays, with what numba compiles) and has a
+process of its own; a dot is the checkout as it is. Both are asked in turns, so that what else the
+machine does slows both. Matches and scans are the same files for both, made by this checkout. What
+is called exists since 1c5d096: `register_correspondences`, `preprocess` and `register`.
 
 Ratios are new over old. CPU time is that of all threads; its least value is what other processes
 disturb least.
@@ -72,10 +72,11 @@ def make_tasks(arguments) -> list[str]:
     from sgor_ros.evaluation import pairs as pairing
     from sgor_ros.evaluation.solver import fpfh_matches
     from sgor_ros.evaluation.solver import made_up
+    from sgor_ros.io.datasets import open_drives
     FOLDER.mkdir(parents=True, exist_ok=True)
     if arguments.data:
         candidates = (pairing.listed_pairs(arguments.data, 36.0)
-                      + pairing.near_pairs(pairing.read_drives(arguments.data), 36.0))
+                      + pairing.near_pairs(open_drives(arguments.data), 36.0))
     else:
         from sgor_ros.world import simulate
         candidates = pairing.near_pairs([pairing.drive_of('street', (
@@ -97,10 +98,14 @@ def make_tasks(arguments) -> list[str]:
 
 def start(commit: str) -> subprocess.Popen:
     """Return a process that runs this file with the sources of a commit."""
-    name = subprocess.check_output(['git', 'rev-parse', '--short', commit], text=True).strip()
-    tree = (FOLDER / name).resolve()
-    if not tree.is_dir():
-        subprocess.check_call(['git', 'worktree', 'add', '--detach', str(tree), name])
+    tree = Path.cwd()
+    if commit != '.':
+        name = subprocess.check_output(['git', 'rev-parse', '--short', commit], text=True).strip()
+        tree = (FOLDER / name).resolve()
+        if not tree.is_dir():
+            tree.mkdir()
+            archive = subprocess.run(['git', 'archive', name], check=True, stdout=subprocess.PIPE)
+            subprocess.run(['tar', '-x', '-C', tree], check=True, input=archive.stdout)
     return subprocess.Popen([sys.executable, __file__, '--worker', str(tree)], text=True,
                             stdin=subprocess.PIPE, stdout=subprocess.PIPE)
 

@@ -125,7 +125,7 @@ def fpfh_matches(pairs: Sequence[Pair], count: int) -> Iterator[Matches]:
 
 def run_solver(sets: Sequence[Matches], config: SgorConfig, runs: int, *, rivals: bool
                ) -> list[Solved]:
-    """Time default and paper's settings, on one thread too, and rivals in turns, after a warm-up."""
+    """Time both presets, on one thread too, and rivals in turns, after a run to warm up."""
     paper = SgorConfig.paper().replace(threads=config.threads)
     configs = {'SGOR': config, "SGOR, paper's settings": paper}
     if config.threads > 1:

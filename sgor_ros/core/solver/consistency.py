@@ -71,10 +71,11 @@ def filter_groups(correspondences: Correspondences, graph: ConsistencyGraph, gro
     support = np.empty((BLOCK, -(-n // 64) * 64), np.float32)
     for places in blocks_of(correspondences.source[groups.keys], np.arange(count)):
         near, wanted = np.zeros((2, n), np.uint64)
-        _mark_keys(graph.start, graph.index, correspondences.source, groups.keys[places],
-                   groups.squared_reach[places], *agreement, near, wanted)
-        block = Block(near, wanted, np.flatnonzero(wanted))
-        add_support(correspondences, graph, block, support)
+        keys = groups.keys[places]
+        visits = _mark_keys(graph.start, graph.index, correspondences.source, keys,
+                            groups.squared_reach[places], *agreement, near, wanted)
+        block = Block(near, wanted, np.flatnonzero(wanted), visits)
+        add_support(correspondences, graph, block, keys, support)
         choose(graph, block, support, places, filtered.kept, filtered.scores)
     return filtered
 
@@ -82,15 +83,21 @@ def filter_groups(correspondences: Correspondences, graph: ConsistencyGraph, gro
 @numba.njit(cache=True, nogil=True)
 def _mark_keys(start, index, points, keys, squared_reach, tight,  # type: ignore[no-untyped-def]
                loose, near, wanted):
-    """Set bit g of `near` for what is consistent with key g; of `wanted` if it may be kept."""
+    """Set bit g of `near` for what is consistent with key g; of `wanted` if it may be kept.
+
+    Return how long the rows of all that is near are together.
+    """
+    visits = U64(0)
     for g in range(U64(len(keys))):
         key = keys[g]
         bit = U64(1) << g
         x, y, z = points[key]
         for k in range(start[key], start[key + U64(1)]):
-            j = index[k]
+            j = U64(index[k])
             near[j] |= bit
+            visits += start[j + U64(1)] - start[j]
             # M_s is the outer product of these with themselves (Eq. 9 to 11)
             if ((tight[key] and tight[j]) or (loose[key] and loose[j])) and squared_distance(
                     points[j, 0], points[j, 1], points[j, 2], x, y, z) <= squared_reach[g]:
                 wanted[j] |= bit
+    return visits

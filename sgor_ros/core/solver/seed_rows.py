@@ -28,6 +28,8 @@ from .graph import weigh
 
 BLOCK = 64
 """Keys of which each has a bit of a word, and a lane of four vectors."""
+SPARSE = 3
+"""Single additions that take as long as one to 64 lanes."""
 
 
 class Block(NamedTuple):
@@ -41,11 +43,14 @@ class Block(NamedTuple):
         Bit g: and key g may keep it.
     rows : (R,) int64
         What any key may keep.
+    visits : int
+        Length of the rows that are near a key, of all keys.
     """
 
     near: NDArray[np.uint64]
     wanted: NDArray[np.uint64]
     rows: NDArray[np.intp]
+    visits: int
 
 
 def blocks_of(points: NDArray[np.float64], keys: NDArray[np.intp]) -> Iterator[NDArray[np.intp]]:
@@ -61,11 +66,14 @@ def blocks_of(points: NDArray[np.float64], keys: NDArray[np.intp]) -> Iterator[N
 
 
 def add_support(correspondences: Correspondences, graph: ConsistencyGraph, block: Block,
-                support: NDArray[np.float32]) -> None:
+                keys: NDArray[np.uint32], support: NDArray[np.float32]) -> None:
     """Write m_l^T W_m for the keys of a block, (64, N), at least where they ask for it."""
-    near, wanted, _ = block
+    near, wanted = block.near, block.wanted
     tasks = support.shape[1] // 16
     if graph.reach <= graph.sigma_d:
+        if block.visits < SPARSE * len(graph.index):
+            shared(_scatter, len(keys), graph.start, graph.index, graph.weight, keys, support)
+            return
         shared(_support, tasks, graph.start, graph.index, graph.weight,
                near.view(np.uint16), support)
         return
@@ -94,6 +102,18 @@ def _asking(start, index, wanted, b):  # type: ignore[no-untyped-def]
     for e in range(start[b], start[b + U64(1)]):
         keys |= wanted[index[e]]
     return keys
+
+
+@numba.njit(cache=True, nogil=True)
+def _scatter(first, last, start, index, weight, keys, support):  # type: ignore[no-untyped-def]
+    """Write the support of each key from the rows that are near it: faster where keys have few."""
+    for g in range(U64(first), U64(last)):
+        own = support[g]
+        own[:] = 0
+        for k in range(start[keys[g]], start[keys[g] + U64(1)]):
+            a = U64(index[k])
+            for e in range(start[a], start[a + U64(1)]):
+                own[index[e]] += weight[e]
 
 
 @numba.njit(cache=True, nogil=True)
