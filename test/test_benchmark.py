@@ -1,5 +1,6 @@
 """The benchmark: its pairs and their truth, its figures, and each of its commands."""
 import csv
+from importlib.util import find_spec
 import json
 
 import numpy as np
@@ -14,6 +15,7 @@ from sgor_ros.evaluation import solver
 from sgor_ros.evaluation.metrics import THREE_SIGMA
 from sgor_ros.evaluation.pairs import Pair
 from sgor_ros.evaluation.rivals import Answer
+from sgor_ros.evaluation.rivals import kiss_matcher_solver
 from sgor_ros.evaluation.run import Method
 from sgor_ros.evaluation.run import Row
 from sgor_ros.evaluation.run import run_pairs
@@ -355,16 +357,36 @@ def test_sequence_command_through_places(tmp_path):
     assert 'tunnel: SGOR, keyframe, no labels | 4 | 0%' in table
 
 
-def test_solver_command(tmp_path):
+def test_solver_command(sequences_folder, tmp_path):
+    """Made-up matches and those of scans, by all solvers; they find what is true."""
     out = tmp_path / 'out'
     assert main(['solver', '--counts', '400', '1000', '--inlier-share', '0.1', '--runs', '2',
-                 '--dense-limit', '400', '--output', str(out)]) == 0
+                 '--dense-limit', '400', '--data', str(sequences_folder), '--pairs', '2',
+                 '--fpfh-matches', '1500', '--output', str(out)]) == 0
     rows = rows_of(out)
-    assert all(float(r['translation_error_m']) < 0.3 for r in rows)
+    assert len({r['matches'] for r in rows}) == 3
+    for r in rows:
+        made_up = r['matches'] == 'made up'
+        assert int(r['count']) in ((400, 1000) if made_up else (1500,))
+        assert float(r['inlier_share']) == pytest.approx(0.1, abs=0.002) or not made_up
+        assert 0 < float(r['consistent_share']) < 0.2
+        assert 0 < float(r['cpu_seconds'])
+        if r['solver'].startswith('SGOR'):
+            assert float(r['translation_error_m']) < 0.3
+    assert {r['solver'] for r in rows} >= {
+        'SGOR', 'SGOR, one thread', "SGOR, paper's settings, one thread"}
     dense, sparse = (next(r for r in rows if r['solver'].startswith(name))
                      for name in ('dense numpy', 'SGOR, 20 groups'))
     assert float(dense['translation_error_m']) == pytest.approx(
         float(sparse['translation_error_m']), abs=1e-5)
+
+
+@pytest.mark.skipif(find_spec('kiss_matcher') is None, reason='KISS-Matcher is not installed')
+def test_solver_of_kiss_matcher_gets_the_same_matches():
+    """It answers with T_target_source, as the others do."""
+    matches = solver.made_up(2000, 0.1, seed=0)
+    T = kiss_matcher_solver(matches.source, matches.target, 0.3)
+    np.testing.assert_allclose(T, matches.T_target_source, atol=0.05)
 
 
 @pytest.mark.parametrize(('arguments', 'message'), [
