@@ -2,11 +2,11 @@
 VENV := .venv
 PY := $(VENV)/bin/python
 
-.PHONY: demo test setup lint clean
+.PHONY: demo test setup lint site clean
 
 setup: $(VENV)/.ready
 
-$(VENV)/.ready: setup.py setup.cfg scripts/setup.sh
+$(VENV)/.ready: setup.py setup.cfg package.xml scripts/setup.sh
 	bash scripts/setup.sh $(VENV)
 	touch $@
 
@@ -16,6 +16,9 @@ demo: setup
 lint: setup
 	$(VENV)/bin/ruff check .
 	$(VENV)/bin/mypy
+
+site: setup
+	$(PY) -m sphinx -q -W --keep-going docs out/site
 
 test: lint
 	$(PY) -m pytest

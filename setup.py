@@ -1,9 +1,14 @@
-"""Package for pip and for colcon (ament_python)."""
+"""Package for pip and for colcon (ament_python); version and people are those of package.xml."""
 from glob import glob
+from pathlib import Path
+from xml.etree import ElementTree
 
 from setuptools import find_packages
 from setuptools import setup
 
+HERE = Path(__file__).resolve().parent
+PACKAGE = ElementTree.parse(HERE / 'package.xml').getroot()
+MAINTAINER = PACKAGE.find('maintainer')
 SHARE = 'share/sgor_ros'
 COMMANDS = {
     'sgor_node': 'sgor_ros.ros.node',
@@ -12,20 +17,37 @@ COMMANDS = {
     'sgor_kitti_to_bag': 'sgor_ros.commands.kitti_to_bag',
     'sgor_benchmark': 'sgor_ros.commands.benchmark',
     'sgor_demo': 'sgor_ros.commands.demo',
+    'sgor_tables': 'sgor_ros.commands.tables',
 }
-# .pcd and .ply files, and the built-in world; the module of open3d without CUDA
+# the built-in world; the module of open3d without CUDA
 OPEN3D = ['open3d-cpu>=0.18']
 
 setup(
     name='sgor_ros',
-    version='0.1.0',
-    description='Global LiDAR registration by semantic-geometric outlier removal (SGOR)',
-    author='sgor_ros maintainers',
-    maintainer='sgor_ros maintainers',
-    maintainer_email='sgor-ros@example.org',
+    version=PACKAGE.findtext('version'),
+    description=PACKAGE.findtext('description'),
+    long_description=(HERE / 'README.md').read_text(encoding='utf-8'),
+    long_description_content_type='text/markdown',
+    url=PACKAGE.findtext('url'),
+    project_urls={'Paper': 'https://arxiv.org/abs/2407.06297'},
+    author=MAINTAINER.text,
+    maintainer=MAINTAINER.text,
+    maintainer_email=MAINTAINER.get('email'),
     license='Apache-2.0',
+    keywords=['LiDAR', 'point cloud registration', 'semantic', 'odometry', 'SLAM', 'ROS 2'],
+    classifiers=[
+        'Development Status :: 4 - Beta',
+        'Intended Audience :: Developers',
+        'Intended Audience :: Science/Research',
+        'Operating System :: POSIX :: Linux',
+        'Programming Language :: Python :: 3 :: Only',
+        'Programming Language :: Python :: 3.12',
+        'Topic :: Scientific/Engineering',
+        'Typing :: Typed',
+    ],
     python_requires='>=3.12',
     packages=find_packages(include=['sgor_ros', 'sgor_ros.*']),
+    package_data={'sgor_ros': ['py.typed']},
     data_files=[
         ('share/ament_index/resource_index/packages', ['resource/sgor_ros']),
         (SHARE, ['package.xml']),
@@ -51,15 +73,19 @@ setup(
         # where no ROS 2 Jazzy is installed: the same rclpy with Fast DDS, as wheels
         'ros': ['ros-jazzy-rclpy[fastrtps]', 'ros-jazzy-common-interfaces'],
         'open3d': OPEN3D,
-        'benchmark': [*OPEN3D, 'kiss-icp', 'kiss_matcher'],
+        # rivals, their matches from depth maps, and a cluster to run on
+        'benchmark': [*OPEN3D, 'kiss-icp', 'kiss_matcher', 'igraph', 'pillow', 'distributed'],
         # to run what docs/pose_graph.md shows
         'slam': ['gtsam>=4.3', 'g2opy'],
         # --visualize; needs numpy 2, which the messages of an installed Jazzy do not take
         'visualize': ['rerun-sdk>=0.41'],
         'test': ['pytest'],
+        # the site: python -m sphinx -W docs out/site
+        'docs': ['sphinx>=8', 'numpydoc>=1.8', 'myst-parser>=4', 'furo'],
         'dev': [
             'mypy',
             'ruff',
+            'build',
             'catkin-pkg',
             'colcon-common-extensions',
             'setuptools<80',    # colcon installs by commands that setuptools 80 dropped

@@ -124,8 +124,9 @@ def work(tree: str) -> None:
     from sgor_ros import register_correspondences
     from sgor_ros import SemanticScan
     from sgor_ros import SgorConfig
+    # with the sizes that the paper's preset had in the beginning
     configs = {'default': SgorConfig().replace(threads=THREADS),
-               'paper': SgorConfig.paper().replace(threads=THREADS)}
+               'paper': SgorConfig.paper().replace(threads=THREADS, groups=200, group_size=400)}
     inputs = {}
     for line in sys.stdin:
         name, preset = line.rstrip('\n').rsplit(', ', 1)

@@ -25,13 +25,15 @@ from sgor_ros.core.trust.evidence import CONTRADICT
 from sgor_ros.core.trust.evidence import evidence_of
 from sgor_ros.core.trust.evidence import testify
 from sgor_ros.core.trust.icp import icp
+from sgor_ros.io.colours import SOURCE
+from sgor_ros.io.colours import STRANGE
+from sgor_ros.io.colours import TARGET
 from sgor_ros.world import Lidar
 from sgor_ros.world import scenes
 
 Array = NDArray[np.float64]
 
 PICTURE = Path(__file__).parents[1] / 'docs/images/trust.png'
-BLUE, ORANGE, RED = '#2f6db3', '#e08a1e', '#d01020'
 SLICE_M = (0.4, 2.4)
 """Heights over the ground that are drawn: neither floor nor ceiling."""
 SLID_M = 8.0
@@ -70,9 +72,9 @@ def main() -> None:
     slide_arrow(grid[0, 0], columns[0][0])
     grid[0, 0].set_ylabel('the answer', fontsize=12)
     grid[1, 0].set_ylabel('another placement', fontsize=12)
-    for colour, marker, label in ((BLUE, 's', 'target scan'), (ORANGE, 's', 'source scan'),
+    for colour, marker, label in ((TARGET, 's', 'target scan'), (SOURCE, 's', 'source scan'),
                                   ('white', 'o', 'where the two sensors stood'),
-                                  (RED, 'o', 'hangs in space that the other sensor saw through')):
+                                  (STRANGE, 'o', 'hangs where the other sensor saw through')):
         grid[0, 0].plot([], [], marker, color=colour, label=label, ms=8,
                         mec='black' if colour == 'white' else colour)
     figure.legend(*grid[0, 0].get_legend_handles_labels(), loc='outside lower center', ncols=4,
@@ -133,7 +135,7 @@ def draw(axes: Any, example: Example, T: Array, width: float) -> None:
     """Draw both scans from above under a placement, and what contradicts it."""
     source, target = example.source, example.target
     W = example.T_world_target
-    for scan, pose, colour in ((target, W, BLUE), (source, W @ T, ORANGE)):
+    for scan, pose, colour in ((target, W, TARGET), (source, W @ T, SOURCE)):
         heights = scan.ground.heights(scan.scan.points)
         shown = scan.scan.points[(heights > SLICE_M[0]) & (heights < SLICE_M[1])]
         placed = se3.transform(pose, shown.astype(np.float64))
@@ -143,8 +145,8 @@ def draw(axes: Any, example: Example, T: Array, width: float) -> None:
     asked = [se3.transform(pose, scan.view.points[thin(len(scan.view.points), ASKED)])
              for scan, pose in ((source, W @ T), (target, W))]
     against = np.vstack(asked)[outcomes == CONTRADICT]
-    axes.plot(*against[:, :2].T, 'o', color=RED, ms=3.2, mew=0)
-    for pose, colour in ((W, BLUE), (W @ T, ORANGE)):
+    axes.plot(*against[:, :2].T, 'o', color=STRANGE, ms=3.2, mew=0)
+    for pose, colour in ((W, TARGET), (W @ T, SOURCE)):
         axes.plot(*pose[:2, 3], 'o', ms=9, mfc='white', mec=colour, mew=2.5, zorder=5)
     found = evidence_of(outcomes)
     axes.set_xlabel(f'{found.agree:.0%} agree, {found.contradict:.1%} contradict', fontsize=11)

@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from .io.datasets import Drive as Drive
     from .io.datasets import open_drive as open_drive
     from .io.datasets import open_drives as open_drives
+    __version__: str
 
 DATASETS = ('Drive', 'open_drive', 'open_drives')
 """What reads files, which the rest of the interface does not."""
@@ -23,6 +24,12 @@ def __getattr__(name: str) -> Any:
     Every module of this package runs this file first, and compiled code takes a second to load:
     the node must know what to do about a signal before that.
     """
+    if name == '__version__':
+        metadata = import_module('importlib.metadata')
+        try:
+            return metadata.version(__name__)
+        except metadata.PackageNotFoundError:    # a checkout that nobody installed
+            return '0+unknown'
     if name == '__all__' or not name.startswith('_'):
         api = import_module('.api', __name__)
         if name == '__all__':

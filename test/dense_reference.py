@@ -18,13 +18,8 @@ def geometric_consistency(gaps, sigma_d, cutoff):
 
 def semantic_consistency(source_labels, target_labels):
     """Return whether (s_i^p, s_j^p) equals (s_i^q, s_j^q) (Eq. 9 and 10), (N, N)."""
-    n = len(source_labels)
-    same = np.zeros((n, n), bool)
-    for i in range(n):
-        for j in range(n):
-            same[i, j] = ((source_labels[i], source_labels[j])
-                          == (target_labels[i], target_labels[j]))
-    return same
+    p, q = np.asarray(source_labels), np.asarray(target_labels)
+    return (p[:, None] == q[:, None]) & (p[None] == q[None])
 
 
 def group_matrix(group, consistent, weights, tight, loose):
@@ -71,26 +66,114 @@ def truncated_distance(transform, source, target, sigma_d):
     return total / len(source)
 
 
-def solve(source, target, sigma_d, cutoff, groups, group_size, keep, tau):
-    """Return T_target_source from matches by the dense path, without labels and ground."""
+def ground_angle(transform, source_normal, target_normal):
+    """Return the angle between R n_p and n_q, radians (Eq. 17)."""
+    return np.arccos(np.clip((transform[:3, :3] @ source_normal) @ target_normal, -1, 1))
+
+
+def refine(transform, source, target, tau):
+    """Return the SVD of all matches nearer than tau (Eq. 20), or the transform if under three."""
+    moved = source @ transform[:3, :3].T + transform[:3, 3]
+    near = np.linalg.norm(moved - target, axis=1) < tau
+    if near.sum() < 3:
+        return transform
+    return weighted_svd(source[near], target[near], np.ones(near.sum()))
+
+
+def spread(points, order, count, spacing):
+    """Return the strongest keys at least `spacing` apart, then the strongest of the others."""
+    taken, passed = [], []
+    for i in order:
+        near = any(np.linalg.norm(points[i] - points[t]) < spacing for t in taken)
+        (passed if near else taken).append(i)
+        if len(taken) == count:
+            break
+    return (taken + passed)[:count]
+
+
+def solve(source, target, sigma_d, cutoff, groups, group_size, keep, tau, spacing=0.0,
+          labels=None, regional=None, normals=None, sigma_theta=np.pi):
+    """Return T_target_source from matches by the dense path, None where no hypothesis passes.
+
+    Labels are pairs: of the source, of the target; without them geometry alone counts.
+    """
     gaps = pair_gaps(source, target)
     consistent, weights = geometric_consistency(gaps, sigma_d, cutoff)
     everything = np.ones_like(consistent, bool)
-    keys = np.argsort(-leading_eigenvector(weights * consistent), kind='stable')[:groups]
+    tight = everything if labels is None else semantic_consistency(*labels)
+    loose = everything if regional is None else semantic_consistency(*regional)
+    order = np.argsort(-leading_eigenvector(weights * consistent), kind='stable')
     kept, transforms = set(), []
-    for key in keys:
+    for key in spread(source, order, groups, spacing):
         near = np.argsort(np.linalg.norm(source - source[key], axis=1), kind='stable')
         group = near[:group_size]
-        row = group_matrix(group, consistent, weights, everything, everything)[
-            list(group).index(key)]
+        row = group_matrix(group, consistent, weights, tight, loose)[list(group).index(key)]
         best = np.argsort(-row, kind='stable')[:keep]
         best = best[row[best] > 0]
+        kept |= set(group[best])
         if len(best) >= 3:
-            kept |= set(group[best])
             transforms.append(weighted_svd(source[group[best]], target[group[best]], row[best]))
+    if normals is not None:
+        transforms = [t for t in transforms if ground_angle(t, *normals) < sigma_theta]
+    if not transforms:
+        return None
     union = sorted(kept)
     costs = [truncated_distance(t, source[union], target[union], sigma_d) for t in transforms]
-    best = transforms[int(np.argmin(costs))]
-    moved = source @ best[:3, :3].T + best[:3, 3]
-    near = np.linalg.norm(moved - target, axis=1) < tau
-    return weighted_svd(source[near], target[near], np.ones(near.sum()))
+    return refine(transforms[int(np.argmin(costs))], source, target, tau)
+
+
+def fit_plane(points):
+    """Return (a, b, c) and d of the plane of points, the normal towards the origin (Eq. 16)."""
+    mu = points.mean(axis=0)
+    scatter = sum(np.outer(p - mu, p - mu) for p in points)
+    normal = np.linalg.svd(scatter)[2][-1]
+    d = -normal @ mu
+    return (normal, d) if d >= 0 else (-normal, -d)
+
+
+def plane_distance(plane, points):
+    """Return the left side of Eq. 3, the root of a^2 + b^2 + c^2 below the line, (N,) metres."""
+    normal, d = plane
+    return np.abs(points @ normal + d) / np.sqrt(normal @ normal)
+
+
+def ground(points, labels, ground_labels, sigma_g, narrow, others, other_labels):
+    """Return the ground normal of labelled points, and which of other points are ground.
+
+    Eq. 2, SVD, Eq. 3, SVD; narrow: new ground points are among those of Eq. 2.
+    """
+    first = fit_plane(points[np.isin(labels, ground_labels)])
+    near, others_near = (plane_distance(first, p) < sigma_g for p in (points, others))
+    if narrow:
+        near &= np.isin(labels, ground_labels)
+        others_near &= np.isin(other_labels, ground_labels)
+    return fit_plane(points[near])[0], others_near
+
+
+def overlap(source_labels, target_labels, ground_labels):
+    """Return which points have a label of both scans that is not of the ground (Eq. 4)."""
+    common = (set(source_labels) & set(target_labels)) - set(ground_labels)
+    return [np.array([s in common for s in labels]) for labels in (source_labels, target_labels)]
+
+
+def regional_labels(points, votes, radius):
+    """Return the label with most votes within a radius; points have a vote a label, (N, C)."""
+    distance = np.linalg.norm(points[:, None] - points[None], axis=-1)
+    return np.array([votes[row <= radius].sum(axis=0).argmax() for row in distance])
+
+
+def voxels(points, labels, size):
+    """Return mean points and votes (V, 256) of all cells, in order of their first points."""
+    cells = {}
+    for cell, point, label in zip(map(tuple, np.floor(points / size)), points, labels,
+                                  strict=True):
+        cells.setdefault(cell, []).append((point, label))
+    means = np.array([np.mean([p for p, _ in cell], axis=0) for cell in cells.values()])
+    votes = np.array([np.bincount([s for _, s in cell], minlength=256)
+                      for cell in cells.values()])
+    return means, votes
+
+
+def nearest(source, target):
+    """Return for each descriptor of the source the nearest of the target, (N,)."""
+    return np.array([np.linalg.norm(target - row, axis=1).argmin() for row in source])

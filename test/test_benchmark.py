@@ -1,6 +1,5 @@
 """The benchmark: its pairs and their truth, its figures, and each of its commands."""
 import csv
-from importlib.util import find_spec
 import json
 
 import numpy as np
@@ -12,10 +11,10 @@ from sgor_ros.core.config import SgorConfig
 from sgor_ros.evaluation import pairs as pairing
 from sgor_ros.evaluation import report
 from sgor_ros.evaluation import solver
+from sgor_ros.evaluation.ablation import PAPER_ROWS
 from sgor_ros.evaluation.metrics import THREE_SIGMA
 from sgor_ros.evaluation.pairs import Pair
 from sgor_ros.evaluation.rivals import Answer
-from sgor_ros.evaluation.rivals import kiss_matcher_solver
 from sgor_ros.evaluation.run import Method
 from sgor_ros.evaluation.run import Row
 from sgor_ros.evaluation.run import run_pairs
@@ -307,13 +306,15 @@ def test_ablation_command(sequences_folder, tmp_path):
     rows = rows_of(out)
     names = [r['method'] for r in rows]
     assert len(set(names)) == len(names)
-    # all that the default does and the paper does not, but for mere sizes
+    # all that the default does and the paper does not
     default, paper = SgorConfig(), SgorConfig.paper()
     beyond = {item.name for item in SgorConfig.settings()
               if getattr(default, item.name) != getattr(paper, item.name)}
-    assert {name.split('=')[0] for name in names if '=' in name and 'paper' not in name
-            } == beyond - {'groups', 'group_size'}
-    assert sum(name.startswith('paper, ') for name in names) == 5    # its own ablations
+    assert {name.split('=')[0] for name in names if '=' in name} == beyond
+    assert sum(name.startswith('paper, row ') for name in names) == 5    # its own ablations
+    table = (out / 'table.md').read_text()
+    for row in PAPER_ROWS:
+        assert f'| {row.number}) {row.name} | {row.recall:.2f} % |' in table
     default = next(r for r in rows if r['method'] == 'default')
     assert default['within'] == 'True'
     # without the local refinement the answer is another
@@ -379,14 +380,6 @@ def test_solver_command(sequences_folder, tmp_path):
                      for name in ('dense numpy', 'SGOR, 20 groups'))
     assert float(dense['translation_error_m']) == pytest.approx(
         float(sparse['translation_error_m']), abs=1e-5)
-
-
-@pytest.mark.skipif(find_spec('kiss_matcher') is None, reason='KISS-Matcher is not installed')
-def test_solver_of_kiss_matcher_gets_the_same_matches():
-    """It answers with T_target_source, as the others do."""
-    matches = solver.made_up(2000, 0.1, seed=0)
-    T = kiss_matcher_solver(matches.source, matches.target, 0.3)
-    np.testing.assert_allclose(T, matches.T_target_source, atol=0.05)
 
 
 @pytest.mark.parametrize(('arguments', 'message'), [

@@ -1,14 +1,23 @@
 """What the docs tell a reader to copy works, and what they point at is there."""
+from html.parser import HTMLParser
 from pathlib import Path
 import re
+import subprocess
+import sys
+from urllib.parse import unquote
+from urllib.parse import urlsplit
 
 from conftest import errors
 from conftest import relative
 import numpy as np
 import pytest
 
+from sgor_ros import api
 from sgor_ros import register
 from sgor_ros import SemanticScan
+from sgor_ros import SgorConfig
+from sgor_ros import TrackerConfig
+from sgor_ros.ros.parameters import NodeConfig
 from sgor_ros.world import Lidar
 from sgor_ros.world import scenes
 
@@ -29,10 +38,76 @@ def registered(kind, seed):
     return register(source, target)
 
 
+def anchors_of(page):
+    """Return what a page can be linked to by, as GitHub makes it from headings."""
+    text = re.sub(r'```.*?```', '', page.read_text(), flags=re.DOTALL)
+    return {re.sub(r'[^\w\- ]', '', heading.lower()).replace(' ', '-')
+            for heading in re.findall(r'^#+ (.*)', text, re.MULTILINE)}
+
+
 @pytest.mark.parametrize('page', PAGES, ids=lambda page: page.name)
 def test_links_lead_somewhere(page):
-    links = re.findall(r'\]\((?!http)([^)#]+)', page.read_text())
-    assert not [link for link in links if not (page.parent / link).exists()]
+    for link, anchor in re.findall(r'\]\((?!http)([^)#]*)#?([^)]*)', page.read_text()):
+        target = page.parent / link if link else page
+        assert target.exists(), link
+        assert not anchor or anchor in anchors_of(target), f'{link}#{anchor}'
+
+
+@pytest.mark.parametrize('page', PAGES, ids=lambda page: page.name)
+def test_defaults_are_not_written_down_again(page):
+    names = '|'.join(item.name for config in (SgorConfig, TrackerConfig, NodeConfig)
+                     for item in config.settings())
+    again = re.findall(rf'`({names})`,? \(\d[^)]*\)', page.read_text())
+    assert not again, 'parameters.md has the default of each, out of the code'
+
+
+class Links(HTMLParser):
+    """What a page of the site points at, and what in it can be pointed at."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.out, self.anchors = set(), set()
+        self.feed(text)
+
+    def handle_starttag(self, tag, attrs):
+        attributes = dict(attrs)
+        self.anchors |= {attributes[name] for name in ('id', 'name') if attributes.get(name)}
+        self.out |= {attributes[name] for name in ('href', 'src') if attributes.get(name)}
+
+
+@pytest.fixture(scope='module')
+def site(tmp_path_factory):
+    """Build the site; any warning is an error."""
+    out = tmp_path_factory.mktemp('site')
+    done = subprocess.run(
+        [sys.executable, '-m', 'sphinx', '-q', '-W', '--keep-going', '-d', str(out / 'trees'),
+         str(ROOT / 'docs'), str(out / 'html')], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return {path: Links(path.read_text()) for path in (out / 'html').rglob('*.html')}
+
+
+def test_links_of_the_site_lead_somewhere(site):
+    followed = 0
+    for page, links in site.items():
+        for link in links.out:
+            if urlsplit(link).scheme:
+                continue
+            path, anchor = unquote(urlsplit(link).path), unquote(urlsplit(link).fragment)
+            target = (page.parent / path).resolve() if path else page
+            assert target.exists(), f'{page.name}: {link}'
+            if anchor and target in site:
+                assert anchor in site[target].anchors, f'{page.name}: {link}'
+            followed += 1
+    assert followed > 500
+
+
+def test_the_site_has_all_settings_and_all_of_the_interface(site):
+    page = {path.stem: links.anchors for path, links in site.items()}
+    for config in (SgorConfig, TrackerConfig, NodeConfig):
+        for item in config.settings():
+            assert f'confval-{item.name}' in page['parameters'], item.name
+    public = set(api.__all__)
+    assert {f'sgor_ros.{name}' for name in public} <= page['api']
 
 
 def test_the_example_of_the_readme(street, capsys):

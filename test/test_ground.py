@@ -7,10 +7,12 @@ from sgor_ros import preprocess
 from sgor_ros import SemanticScan
 from sgor_ros import SgorConfig
 from sgor_ros.core.scan.ground import fit_plane
+from sgor_ros.core.scan.ground import printed_ground
 from sgor_ros.core.scan.ground import segment_ground
 from sgor_ros.core.scan.voxels import one_point_voxels
 
 ROAD, BUILDING = 9, 13    # classes inside
+ROADS = frozenset({ROAD})
 
 
 def street(seed=0, tilt=(0.0, 0.0), height=1.7, noise=0.0):
@@ -42,8 +44,9 @@ def test_plane_of_three_points_by_hand():
 def test_plane_by_labels(tilt, robust):
     """Normal to half a degree, sensor height to 3 cm, towards the sensor."""
     points, labels, truth = street(tilt=tilt)
-    ground = segment_ground(one_point_voxels(points, labels), frozenset({ROAD}),
-                            SgorConfig(robust_ground=robust))
+    cloud = one_point_voxels(points, labels)
+    ground = (segment_ground(cloud, ROADS, SgorConfig()) if robust else
+              printed_ground(cloud, points, labels, ROADS, SgorConfig()))
     assert ground.source == 'labels'
     assert angle_deg(ground.normal, truth) < 0.5
     assert ground.offset == pytest.approx(1.7, abs=0.03)
@@ -55,20 +58,22 @@ def test_wrong_labels_hardly_tilt_the_plane():
     points, labels, truth = street(noise=0.5, tilt=(0.05, 0.02))
     config = SgorConfig()
     cloud = one_point_voxels(points, labels)
-    ground = segment_ground(cloud, frozenset({ROAD}), config)
+    ground = segment_ground(cloud, ROADS, config)
     assert angle_deg(ground.normal, truth) < 1.0
     # ground is what lies on the plane, whatever its label says
     assert ground.mask[:3000].mean() > 0.95
-    once = segment_ground(cloud, frozenset({ROAD}), config.replace(secondary_ground=False))
+    once = segment_ground(cloud, ROADS, config.replace(secondary_ground=False))
     assert np.array_equal(once.mask, labels == ROAD)
+    narrow = segment_ground(cloud, ROADS, config.replace(labelled_ground=True))
+    assert np.array_equal(narrow.mask, ground.mask & (labels == ROAD))
+    np.testing.assert_array_equal(narrow.normal, ground.normal)
 
 
 @pytest.mark.parametrize('tilt', [(0.0, 0.0), (0.2, 0.1)])
 def test_geometry_where_labels_are_missing(tilt):
     """Without labels the road is found among larger walls, and the result says how."""
     points, labels, truth = street(tilt=tilt)
-    ground = segment_ground(one_point_voxels(points, np.zeros_like(labels)), frozenset({ROAD}),
-                            SgorConfig())
+    ground = segment_ground(one_point_voxels(points, np.zeros_like(labels)), ROADS, SgorConfig())
     assert ground.source == 'geometry'
     assert angle_deg(ground.normal, truth) < 0.5
     prepared = preprocess(SemanticScan(points))

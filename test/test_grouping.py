@@ -1,4 +1,5 @@
 """Key correspondences and their groups, against plain Python."""
+import dense_reference as dense
 import numpy as np
 import pytest
 from test_consistency import random_matches
@@ -9,17 +10,6 @@ from sgor_ros.core.solver.grouping import group
 from sgor_ros.core.solver.grouping import leading_eigenvector
 
 
-def greedy(points, order, count, spacing):
-    """Return the strongest keys at least `spacing` apart, then the strongest of the others."""
-    taken, passed = [], []
-    for i in order:
-        near = any(np.linalg.norm(points[i] - points[t]) < spacing for t in taken)
-        (passed if near else taken).append(i)
-        if len(taken) == count:
-            break
-    return (taken + passed)[:count]
-
-
 @pytest.mark.parametrize('spacing', [0.0, 5.0, 15.0, 20.0])
 def test_keys_are_the_strongest_that_are_far_enough_apart(spacing):
     """As a plain loop takes them; where the spacing runs out, the strongest that were left."""
@@ -28,7 +18,7 @@ def test_keys_are_the_strongest_that_are_far_enough_apart(spacing):
     graph = consistency_graph(matches, config)
     order = np.argsort(-leading_eigenvector(graph), kind='stable')
     keys = group(matches, graph, config).keys
-    assert keys.tolist() == greedy(matches.source, order, 100, spacing)
+    assert keys.tolist() == dense.spread(matches.source, order, 100, spacing)
     gaps = np.linalg.norm(matches.source[keys][:, None] - matches.source[keys], axis=-1)
     gaps[np.arange(100), np.arange(100)] = np.inf
     if spacing == 5.0:

@@ -93,19 +93,29 @@ def test_each_group_follows_its_own_matches():
                               np.array([[9, 8, 7], [7, 6, 5]], np.float32))
     found = hypothesise(matches_of(source, target), filtered)
     np.testing.assert_allclose(found.T_target_source, [A, B], atol=1e-9)
-    assert [set(row) for row in found.kept] == [{0, 1, 2}, {4, 5, 6}]
+    assert found.union.tolist() == [0, 1, 2, 4, 5, 6]
+
+
+def test_the_union_is_of_all_groups():
+    """Eq. 18: each match once; those of a group that is too small for a hypothesis too."""
+    source = np.random.default_rng(9).uniform(-9, 9, (8, 3))
+    filtered = FilteredGroups(np.array([[5, 1, 2, 0], [2, 7, -1, -1], [1, 5, 2, -1]]),
+                              np.array([[4, 3, 2, 1], [2, 1, 0, 0], [3, 2, 1, 0]], np.float32))
+    found = hypothesise(matches_of(source, source + 1), filtered)
+    assert len(found.T_target_source) == 2
+    assert found.union.tolist() == [0, 1, 2, 5, 7]
 
 
 @pytest.mark.parametrize('positive', [0, 1, 2, 3, 4])
 def test_groups_with_fewer_than_three_give_none(positive):
-    """Only matches with weight count; those kept beyond them are marked as none."""
+    """Only matches with weight count."""
     source = np.random.default_rng(8).uniform(-9, 9, (6, 3))
     kept, scores = np.full((1, 5), -1), np.zeros((1, 5), np.float32)
     kept[0, :positive], scores[0, :positive] = np.arange(positive), 1
     found = hypothesise(matches_of(source, source + 1), FilteredGroups(kept, scores))
     assert len(found.T_target_source) == (positive >= 3)
+    assert found.union.tolist() == list(range(positive))
     if positive >= 3:
-        assert sorted(found.kept[0]) == [-1] * (5 - positive) + list(range(positive))
         assert np.isfinite(found.T_target_source).all()
         np.testing.assert_allclose(found.T_target_source[0, :3, 3], 1.0, atol=1e-9)
 

@@ -3,9 +3,15 @@ import numpy as np
 import pytest
 from rosbags.highlevel import AnyReader
 
+from sgor_ros import InputError
 from sgor_ros.commands.kitti_to_bag import main
 from sgor_ros.io.bags import BagReader
 from sgor_ros.io.pointcloud2 import decode
+from sgor_ros.io.trajectories import read_calibration
+from sgor_ros.io.trajectories import read_kitti
+from sgor_ros.io.trajectories import read_poses
+from sgor_ros.io.trajectories import read_times
+from sgor_ros.io.trajectories import write_kitti
 
 NUMBERS = (3, 4, 6)
 
@@ -104,7 +110,7 @@ def broken(sequence, what):
         (sequence / 'times.txt').unlink()
         return 'times.txt: no such file'
     np.savetxt(sequence / 'poses.txt', np.tile(np.eye(4)[:3].reshape(-1), (10, 1)))
-    return 'calib.txt: no row Tr'
+    return 'calib.txt: cannot be read'
 
 
 @pytest.mark.parametrize('what', [
@@ -116,6 +122,49 @@ def test_broken_sequences(sequence, tmp_path, capsys, what):
     message = capsys.readouterr().err
     assert message.startswith('error: ')
     assert says in message
+
+
+EYE = '1 0 0 0 0 1 0 0 0 0 1 0'
+
+
+@pytest.mark.parametrize(('times', 'says'), [
+    ('0\n1\nnan\n3\n', 'time 2 is nan s'), ('0\n1e300\n', r'time 1 is 1e\+300 s'),
+    ('-1\n1\n', 'time 0 is -1 s'), ('0 1 2\n3 4 5\n', 'expected one number a line, got 3'),
+    ('0\n1\n0.5\n', 'time 2, 0.5 s, is not later'), ('0\n0\n', 'time 1, 0 s, is not later'),
+    ('0\nzwei\n', 'cannot be read'), ('', 'it is empty')])
+@pytest.mark.filterwarnings('error')
+def test_times_are_times(tmp_path, times, says):
+    (tmp_path / 'times.txt').write_text(times)
+    with pytest.raises(InputError, match=rf'times\.txt: .*{says}'):
+        read_times(tmp_path / 'times.txt')
+
+
+@pytest.mark.parametrize(('row', 'says'), [
+    ('nan ' * 12, 'the pose of scan 1 is not finite'),
+    ('nan' + EYE[1:], 'the pose of scan 1 is not finite'),
+    (EYE.replace('1', '0'), 'the pose of scan 1 is no rotation'),
+    ('-' + EYE, 'the pose of scan 1 is no rotation'),
+    (EYE.replace('0 0 0 0', '0 0 1e300 0'), 'the pose of scan 1 is no rotation'),
+    (EYE + '\n1 2 3', 'cannot be read')])
+def test_poses_are_poses(tmp_path, row, says):
+    (tmp_path / 'poses.txt').write_text(f'{EYE}\n{row}\n')
+    with pytest.raises(InputError, match=rf'poses\.txt: {says}'):
+        read_poses(tmp_path / 'poses.txt')
+
+
+def test_lines_without_a_pose_are_kept_where_they_may_be(tmp_path):
+    write_kitti(tmp_path / 'poses.txt', [np.eye(4), None])
+    assert np.isnan(read_kitti(tmp_path / 'poses.txt')[1, :3]).all()
+
+
+@pytest.mark.parametrize(('row', 'says'), [
+    ('Tr: ' + '0 ' * 12, 'Tr is no rotation and translation'),
+    (f'Tr: {EYE} 0', 'Tr has 13 numbers'),
+    ('P0: 1 2 3', 'no row Tr'), ('Tr: one two', 'cannot be read')])
+def test_the_calibration_is_a_motion(tmp_path, row, says):
+    (tmp_path / 'calib.txt').write_text(row + '\n')
+    with pytest.raises(InputError, match=rf'calib\.txt: {says}'):
+        read_calibration(tmp_path / 'calib.txt')
 
 
 def test_an_existing_bag_is_not_overwritten(sequence, tmp_path, capsys):

@@ -239,3 +239,10 @@ def test_names_that_are_none(name):
         label_convention(name)
     assert repr(name) in str(caught.value)
     assert all(known in str(caught.value) for known in CONVENTIONS)
+
+
+def test_a_mask_has_32_bits(tmp_path):
+    text = (Path(__file__).parents[1] / 'config/labels/nuscenes.yaml').read_text()
+    (tmp_path / 'a.yaml').write_text(f'{text}\nmask: {2**63}\n')
+    with pytest.raises(InputError, match='mask must be in 0 to 0xFFFFFFFF'):
+        label_convention(str(tmp_path / 'a.yaml'))

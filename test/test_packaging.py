@@ -1,5 +1,6 @@
 """The package as users install it: by pip, and by colcon as `ros2 run` finds it."""
 from importlib.metadata import entry_points
+from importlib.metadata import version
 import os
 from pathlib import Path
 import shutil
@@ -12,6 +13,7 @@ import numpy as np
 import pytest
 import ros_helpers as ros
 
+import sgor_ros
 from sgor_ros.io.messages import matrix_of
 from sgor_ros.ros.player import Domain
 from sgor_ros.world import Lidar
@@ -19,7 +21,7 @@ from sgor_ros.world import simulate
 
 ROOT = Path(__file__).resolve().parents[1]
 COMMANDS = {'sgor_node', 'sgor_replay', 'sgor_register', 'sgor_kitti_to_bag', 'sgor_benchmark',
-            'sgor_demo'}
+            'sgor_demo', 'sgor_tables'}
 SITE = f'lib/python3.{sys.version_info.minor}/site-packages'
 # what a user's package finds out about its own tables
 LABELS = ('import sgor_ros; from sgor_ros.core.scan.labels import label_convention as find;'
@@ -69,10 +71,10 @@ def sourced(install, *command):
 
 def test_package_xml_and_setup_agree():
     package = parse_package(str(ROOT / 'package.xml'))
-    name, version, licence, mail = run(
+    name, number, licence, mail = run(
         sys.executable, 'setup.py', '--quiet', '--name', '--version', '--license',
         '--maintainer-email', cwd=ROOT).split()
-    assert (package.name, package.version, package.licenses) == (name, version, [licence])
+    assert (package.name, package.version, package.licenses) == (name, number, [licence])
     # colcon takes the package for one of plain Python where the address is no address
     assert [person.email for person in package.maintainers] == [mail]
     assert package.get_build_type() == 'ament_python'
@@ -84,6 +86,14 @@ def test_all_commands_exist():
     assert set(installed) == COMMANDS
     for command in installed.values():
         assert callable(command.load())
+
+
+def test_the_package_knows_its_version():
+    assert sgor_ros.__version__ == version('sgor_ros')
+
+
+def test_pip_installs_the_marker_of_types(by_pip):
+    assert (by_pip / SITE / 'sgor_ros/py.typed').is_file()
 
 
 def test_pip_installs_commands_and_label_tables(by_pip):

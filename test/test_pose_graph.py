@@ -1,6 +1,6 @@
-"""The lines of docs/pose_graph.md, run in the optimisers: an extra, `pip install .[slam]`."""
+"""What docs/pose_graph.md shows, run in the optimisers: an extra, `pip install .[slam]`."""
 from pathlib import Path
-import re
+import runpy
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ from sgor_ros.io.messages import odometry_of
 from sgor_ros.io.messages import relative_pose
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
-DOCS = Path(__file__).resolve().parents[1] / 'docs/pose_graph.md'
+EXAMPLES = sorted((Path(__file__).resolve().parents[1] / 'examples').glob('pose_graph_*.py'))
 SCAN_NS, REFERENCE_NS = 1_700_000_000_300_000_000, 1_700_000_000_000_000_000
 DRAWS = 4000
 # of the mean of so many values of chi squared with 6 degrees of freedom
@@ -23,12 +23,9 @@ SPREAD = np.sqrt(2 * 6 / DRAWS)
 
 
 def from_docs(name):
-    """Return the function of a name as a reader would copy it."""
-    block, = (text for text in re.findall(r'```python\n(.*?)```', DOCS.read_text(), re.DOTALL)
-              if f'def {name}' in text)
-    scope = {}
-    exec(block, scope)
-    return scope[name]
+    """Return the function of a name out of the examples that the page shows."""
+    path, = (path for path in EXAMPLES if f'def {name}(' in path.read_text())
+    return runpy.run_path(str(path))[name]
 
 
 def bag_type(name):

@@ -137,3 +137,10 @@ def test_real_indoor_pair(data_folder, tmp_path):
     metres, degrees = errors(np.array(result['T_target_source']), truth)
     assert metres < 0.1
     assert degrees < 3.0
+
+
+def test_a_number_is_no_name_of_a_setting(pair, tmp_path, capsys):
+    params = tmp_path / 'params.yaml'
+    params.write_text('/**:\n  ros__parameters:\n    5: 3\n    nonsense: 1\n')
+    assert main([*map(str, pair[:2]), '--params-file', str(params)]) == 0
+    assert 'so ignored: 5, nonsense' in capsys.readouterr().err

@@ -3,7 +3,11 @@ import numpy as np
 import pytest
 
 from sgor_ros import InputError
+from sgor_ros import preprocess
+from sgor_ros import register
+from sgor_ros import register_correspondences
 from sgor_ros import SemanticScan
+from sgor_ros import Tracker
 
 NAN = float('nan')
 
@@ -59,6 +63,12 @@ def test_rows_that_are_not_finite_go_with_their_labels(bad):
     (None, None, 'points'),
     ([[1, 2, 3], [4, 5]], None, 'points: not an array of numbers'),
     ([['a', 'b', 'c']], None, 'points: not an array of numbers'),
+    (np.zeros((4, 3), 'M8[s]'), None, 'points: not an array of numbers, but of datetime64'),
+    (np.zeros((4, 3), 'm8[s]'), None, 'points: not an array of numbers, but of timedelta64'),
+    (np.ones((4, 3), complex), None, 'points: not an array of numbers, but of complex128'),
+    (np.ones((4, 3), bool), None, 'points: not an array of numbers, but of bool'),
+    (np.ones((4, 3)), np.zeros(4, 'm8[s]'), 'labels: expected integers, got timedelta64'),
+    (np.ones((4, 3)), [[1], [2, 3], [4], [5]], 'labels: expected integers'),
     (np.empty((0, 3)), None, 'points: the scan is empty'),
     (np.full((7, 3), NAN), None, 'points: none of 7 is finite'),
     (np.ones((4, 3)), [1, 2, 3], r'labels: expected one a point, \(4,\), got shape \(3,\)'),
@@ -72,6 +82,65 @@ def test_what_is_no_scan_is_refused_by_name(points, labels, words):
     """The message names the field and what came instead."""
     with pytest.raises(InputError, match=words):
         SemanticScan(points, labels)
+
+
+@pytest.mark.filterwarnings('error')
+def test_what_float32_cannot_hold_is_not_finite():
+    assert SemanticScan([[1e300, 0, 0], [1, 2, 3]]).points.tolist() == [[1, 2, 3]]
+
+
+def test_points_can_stand_for_a_scan(street):
+    """Arrays are scans without labels; the result is the same."""
+    (target, _, _), (source, _, _) = street[0], street[1]
+    by_scans = register(SemanticScan(source), SemanticScan(target))
+    by_arrays = register(source, target)
+    # threads add up in any order
+    np.testing.assert_allclose(by_arrays.T_target_source, by_scans.T_target_source, atol=1e-9)
+    assert preprocess(source).scan.labels is None
+
+
+@pytest.mark.parametrize('call', [
+    lambda scan, config: register(scan, scan, config), preprocess,
+    lambda scan, config: register_correspondences(scan, scan, config=config),
+    lambda scan, config: Tracker(config)])
+def test_a_configuration_is_one_or_none(call):
+    scan = np.random.default_rng(0).normal(0, 5, (50, 3))
+    call(scan, None)
+    for config in ({}, {'voxel_size': 1.0}):
+        with pytest.raises(InputError, match=r'expected SgorConfig, got dict; SgorConfig\(\*\*'):
+            call(scan, config)
+    with pytest.raises(InputError, match='config: expected SgorConfig, got str'):
+        call(scan, 'outdoor')
+
+
+@pytest.mark.parametrize(('source', 'target', 'says'), [
+    (None, np.ones((4, 3)), 'source: neither a SemanticScan nor .* but of object'),
+    (np.ones((4, 3)), np.ones((4, 4)), r'target: neither a SemanticScan nor .* \(4, 4\)'),
+    (np.ones((4, 3)), 'a.bin', 'target: neither a SemanticScan')])
+def test_what_cannot_be_registered_is_named(source, target, says):
+    with pytest.raises(InputError, match=says):
+        register(source, target)
+
+
+def test_a_prepared_scan_is_not_prepared_again():
+    prepared = preprocess(np.random.default_rng(0).normal(0, 5, (50, 3)))
+    with pytest.raises(InputError, match='scan: it has been preprocessed already'):
+        preprocess(prepared)
+
+
+def test_everything_prints_in_a_few_lines(street):
+    (target, labels, _), (source, _, _) = street[0], street[1]
+    scan = SemanticScan(target, labels)
+    for thing, says in ((scan, f'SemanticScan({len(target)} points, '),
+                        (preprocess(scan), 'keypoints, scale 1)')):
+        assert says in repr(thing)
+        assert len(repr(thing)) < 100
+    good, bad = register(source, target), register(np.ones((30, 3)), scan)
+    for result, says in ((good, 'Registration(registered'),
+                         (bad, f'Registration(not registered: {bad.reason}')):
+        assert repr(result).startswith(says)
+        assert len(str(result).splitlines()) < 15
+    assert f'T_target_source [[ {good.T_target_source[0, 0]:.2f}'[:22] in repr(good)
 
 
 def test_labels_are_checked_against_the_points_as_given():

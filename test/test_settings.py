@@ -7,6 +7,7 @@ import pytest
 from sgor_ros import InputError
 from sgor_ros import SgorConfig
 from sgor_ros import TrackerConfig
+from sgor_ros.core.config import PAPER_STEPS
 
 FIELDS = [(kind, item) for kind in (SgorConfig, TrackerConfig) for item in kind.settings()]
 NUMBERS = [pytest.param(kind, item, id=item.name) for kind, item in FIELDS
@@ -131,14 +132,39 @@ BEYOND = [item for item in SgorConfig.settings() if 'beyond the paper' in item.m
 
 
 @pytest.mark.parametrize('name', [item.name for item in BEYOND] + [
-    'robust_ground', 'local_refinement', 'min_confidence'])
+    'local_refinement', 'min_confidence'])
 def test_paper_turns_off_what_goes_beyond_it(name):
     """Each mechanism of ours is on by default and off in the preset of the paper."""
-    if name == 'scale':
-        assert (SgorConfig.paper().scale, SgorConfig().scale) == (1, 0)
-        return
     assert getattr(SgorConfig.paper(), name) in (False, 0)
     assert getattr(SgorConfig(), name) not in (False, 0)
+
+
+def test_paper_is_the_default_where_nothing_is_printed():
+    """One rule: what is neither printed nor ours has the value of the default."""
+    paper, default = SgorConfig.paper(), SgorConfig()
+    differ = {item.name for item in SgorConfig.settings()
+              if getattr(paper, item.name) != getattr(default, item.name)}
+    assert differ == {*PAPER_STEPS, 'scale'}
+    assert paper.scale == 1
+
+
+def test_paper_steps_keep_sizes_and_ablations():
+    """The same is off in any configuration; lengths, thresholds and ablations are its own."""
+    own = SgorConfig.indoor().replace(semantics='hard', group_keep=20, scale=0.5)
+    steps = own.paper_steps()
+    for item in SgorConfig.settings():
+        expected = PAPER_STEPS.get(item.name, getattr(own, item.name))
+        assert getattr(steps, item.name) == expected
+    assert SgorConfig().paper_steps() == SgorConfig.paper()
+
+
+def test_kitti_protocol_is_the_paper_with_another_front_end():
+    protocol, paper = SgorConfig.kitti_protocol(), SgorConfig.paper()
+    assert (protocol.voxel_size, protocol.normal_radius, protocol.descriptor_radius) == (
+        0.3, 0.6, 1.5)
+    assert protocol.sampled_keypoints
+    assert protocol.max_correspondences == 8000
+    assert protocol == paper.replace(voxel_size=0.3, normal_radius=0.6, descriptor_radius=1.5)
 
 
 def test_paper_keeps_what_is_printed():
@@ -150,5 +176,14 @@ def test_paper_keeps_what_is_printed():
     assert paper.semantics == 'loose'
     assert paper.refinement_rounds == 1
     assert paper.moving_vote
+    assert paper.drop_ground_labels == 'point'    # s_i of Eq. 4
+    assert paper.min_inliers == 0
     # exp(-d^2 / (2 sigma^2)) is cut where nothing is left of it
     assert math.exp(-paper.weight_cutoff**2 / 2) < 1e-7
+
+
+def test_an_error_is_one_line_that_a_terminal_shows():
+    """Names come out of files; an escape of a terminal among them is shown, not obeyed."""
+    error = InputError('field \x1b[2J\x00: broken\n    in line 2\n')
+    assert str(error) == r'field \x1b[2J\x00: broken in line 2'
+    assert str(InputError('Grüße, 5 °')) == 'Grüße, 5 °'

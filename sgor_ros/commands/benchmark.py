@@ -14,6 +14,7 @@ import numpy as np
 
 from ..core.common.settings import InputError
 from ..core.config import SgorConfig
+from ..evaluation import ablation as ablations
 from ..evaluation import pairs as pairing
 from ..evaluation import plots
 from ..evaluation import report
@@ -38,19 +39,6 @@ from .scene_pairs import scene_pairs
 WORLD_SEEDS = (0, 1)
 WORLD_SCANS, WORLD_SPEED = 40, 45.0
 """Of the pairs: scans 4.5 m apart, half way around the loop."""
-
-# what is beyond the paper, turned off
-WITHOUT: tuple[dict[str, Any], ...] = (
-    {'match_within_labels': False}, {'height_gate': 0.0}, {'context_weight': 0.0},
-    {'cloud_check': False}, {'robust_ground': False}, {'drop_ground_labels': False},
-    {'quick_keypoints': 0}, {'local_refinement': False}, {'refinement_rounds': 1},
-    {'moving_vote': True}, {'unlabelled_attempt': False}, {'rival_radius': 0.0},
-    {'min_confidence': 0.0}, {'scale': 1.0},
-    {'weight_cutoff': SgorConfig.paper().weight_cutoff})
-# ablations 1, 3, 5, 6 and 8 of the paper
-PAPER_WITHOUT: tuple[dict[str, Any], ...] = (
-    {'correspondence_preprocessing': False}, {'secondary_ground': False}, {'semantics': 'none'},
-    {'semantics': 'hard'}, {'ground_check': False})
 
 DENSE_REFERENCE = Path(__file__).parents[2] / 'test/dense_reference.py'
 
@@ -119,22 +107,17 @@ def wrong(arguments: Namespace) -> int:
 
 
 def ablation(arguments: Namespace) -> int:
-    """Turn the mechanisms off, one at a time."""
-    config = _config(arguments)
-    paper = _paper(arguments)
-    methods = [sgor('default', config),
-               *(sgor(_name(change), config.replace(**change)) for change in WITHOUT),
-               sgor('paper', paper),
-               *(sgor(f'paper, {_name(change)}', paper.replace(**change))
-                 for change in PAPER_WITHOUT)]
+    """Turn the mechanisms off, one at a time, as the paper does and ours too."""
+    methods = ablations.methods(arguments.cores, only_paper=arguments.paper)
     right = _right_pairs(arguments, _drives(arguments), arguments.pairs)
     rows = running.run_pairs(right, methods, arguments.seed)
     names = [method.name for method in methods]
     counts = {data_set: sum(pair.data_set == data_set for pair in right)
               for data_set in sorted({pair.data_set for pair in right})}
-    text = (report.ablation_table(rows, names) + f'\n\n{len(right)} pairs ('
+    text = (f'{report.ablation_table(rows, names)}\n\n{ablations.paper_table(rows)}\n\n'
+            f'{len(right)} pairs ('
             + ', '.join(f'{count} {name}' for name, count in counts.items())
-            + f'). {report.RULE}')
+            + f'); the paper: 555 of KITTI, 9.5 m apart. {report.RULE}')
     _finish(arguments, text, [asdict(row) for row in rows], len(right), 0)
     plots.plot_ablation(arguments.output / 'plot.png', rows, names)
     return 0
@@ -285,10 +268,6 @@ def _dense_reference() -> solver.Dense | None:
     spec.loader.exec_module(module)
     found: solver.Dense = module.solve
     return found
-
-
-def _name(change: dict[str, Any]) -> str:
-    return ', '.join(f'{name}={value}' for name, value in change.items())
 
 
 def _finish(arguments: Namespace, text: str, records: list[dict[str, Any]], right: int,

@@ -33,6 +33,8 @@ def benchmark_parser() -> ArgumentParser:
                              'random and evenly over data sets and distances')
     three = _add(commands, 'ablation', 'every mechanism off, one at a time')
     three.add_argument('--pairs', type=_positive, default=200, help='right pairs, likewise')
+    three.add_argument('--paper', action='store_true', help="only the rows of the paper's table "
+                       'and its other readings')
     four = _add(commands, 'sequence', 'odometry: drift, time a scan, and '
                 'whether its covariance holds')
     four.add_argument('--scans', type=_count, default=120, help='of each drive, and of the '

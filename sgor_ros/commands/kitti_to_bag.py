@@ -10,9 +10,9 @@ from ..core.common import se3
 from ..core.common.settings import InputError
 from ..io.bags import BagWriter
 from ..io.datasets import semantickitti
-from ..io.datasets.files import read_calibration
 from ..io.messages import odometry_of
 from ..io.messages import point_cloud2
+from ..io.trajectories import read_calibration
 from .options import parser
 from .options import run
 

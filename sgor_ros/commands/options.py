@@ -98,12 +98,13 @@ def read_parameters(arguments: Namespace, known: Iterable[Setting]) -> dict[str,
         content = yaml.safe_load(path.read_text())
         nodes = [node['ros__parameters'] for node in content.values()]
         parameters = {name: value for node in nodes for name, value in node.items()}
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+    # a date that is none is a ValueError, as is text that is not UTF-8
+    except (OSError, ValueError, RecursionError, yaml.YAMLError) as error:
         raise InputError(f'--params-file {path}: cannot be read: {error}') from error
     except (AttributeError, KeyError, TypeError) as error:
         raise InputError(f'--params-file {path}: expected "/**: ros__parameters:" and settings '
                          'below it') from error
-    unknown = sorted(parameters.keys() - {item.name for item in known})
+    unknown = sorted(map(str, parameters.keys() - {item.name for item in known}))
     if unknown:
         print(f'warning: {path}: no settings of this command, so ignored: {", ".join(unknown)}',
               file=sys.stderr)

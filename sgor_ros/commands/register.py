@@ -28,7 +28,8 @@ from .options import read_parameters
 from .options import run
 
 FAILED = 1
-PRESETS = {'outdoor': SgorConfig.outdoor, 'indoor': SgorConfig.indoor, 'paper': SgorConfig.paper}
+PRESETS = {'outdoor': SgorConfig.outdoor, 'indoor': SgorConfig.indoor, 'paper': SgorConfig.paper,
+           'kitti_protocol': SgorConfig.kitti_protocol}
 
 
 def main(argv: list[str] | None = None) -> int:

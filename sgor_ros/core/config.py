@@ -7,6 +7,15 @@ from typing import Self
 from .common.settings import InputError
 from .common.settings import setting
 from .common.settings import Settings
+from .common.settings import Value
+
+PAPER_STEPS: dict[str, Value] = {
+    'labelled_ground': True, 'robust_ground': False, 'drop_ground_labels': 'point',
+    'sampled_keypoints': True, 'quick_keypoints': 0, 'match_within_labels': False,
+    'unlabelled_attempt': False, 'height_gate': 0.0, 'context_weight': 0.0, 'moving_vote': True,
+    'weight_cutoff': 6.0, 'cloud_check': False, 'refinement_rounds': 1,
+    'local_refinement': False, 'min_inliers': 0, 'rival_radius': 0.0, 'min_confidence': 0.0}
+"""Each of them the paper, where the default goes beyond it; and a fixed scale."""
 
 
 @dataclass(frozen=True)
@@ -41,8 +50,12 @@ class SgorConfig(Settings):
         0.25, 'Points nearer to the ground plane are ground', 'm', minimum=0.005, maximum=5.0)
     secondary_ground: bool = setting(
         True, 'Segment the ground a second time by distance; false: by labels only (ablation 3)')
+    labelled_ground: bool = setting(
+        False, 'Of the points near the plane only those with a ground label are ground, the '
+        'narrow reading of Eq. 3; false: each is, the wide one')
     robust_ground: bool = setting(
-        True, 'Find the ground plane by consensus near the sensor; false: fit as printed')
+        True, 'Find the ground plane by consensus of voxels near the sensor, and by geometry '
+        'where there are no ground labels (beyond the paper); false: SVD of all ground points')
     ground_radius: float = setting(
         25.0, 'Horizontal reach of the ground plane fit when robust_ground is on', 'm',
         minimum=1.0, maximum=1000.0)
@@ -52,8 +65,10 @@ class SgorConfig(Settings):
     # features and correspondences (Sec. III-B)
     correspondence_preprocessing: bool = setting(
         True, 'Leave out ground and classes that only one scan has; false: ablation 1')
-    drop_ground_labels: bool = setting(
-        True, 'Leave ground labels off the plane out of matching too (beyond the paper)')
+    drop_ground_labels: str = setting(
+        'regional', 'Which ground labels off the plane stay out of matching too: point, those of '
+        'single points (Eq. 4); regional, those of the vote; none', choices=(
+            'regional', 'point', 'none'))
     normal_radius: float = setting(
         1.5, 'Neighbourhood of a normal', 'm', minimum=0.01, maximum=20.0)
     descriptor_radius: float = setting(
@@ -62,6 +77,11 @@ class SgorConfig(Settings):
         1.0, 'Neighbourhood of the regional label vote', 'm', minimum=0.0, maximum=20.0)
     max_correspondences: int = setting(
         8000, 'Keypoints to match; more are thinned evenly', minimum=10, maximum=50000)
+    sampled_keypoints: bool = setting(
+        False, 'Draw max_correspondences keypoints of each scan at random, as the protocols of '
+        'KITTI do; false: those of the source are matched to all of the target')
+    sampling_seed: int = setting(
+        0, 'Of that draw; another one gives another sample', minimum=0, maximum=2**31 - 1)
     quick_keypoints: int = setting(
         1000, 'Keypoints of a first attempt; all are matched only when that is refused. 0: no '
         'first attempt (beyond the paper)', minimum=0, maximum=50000)
@@ -123,7 +143,8 @@ class SgorConfig(Settings):
         0.5, 'Farthest pair of points that the local refinement uses', 'm',
         minimum=0.02, maximum=10.0)
     min_inliers: int = setting(
-        10, 'Fewer inliers are a failure', minimum=3, maximum=10000)
+        10, 'Fewer inliers, or inliers on a line, are a failure; 0: neither is asked (beyond the '
+        'paper)', minimum=0, maximum=10000)
     evidence_reach: float = setting(
         0.6, 'Keypoints with one of the same label nearer than this under the result agree', 'm',
         minimum=0.01, maximum=10.0)
@@ -168,12 +189,24 @@ class SgorConfig(Settings):
 
     @classmethod
     def paper(cls) -> Self:
-        """Return the paper's steps and nothing besides."""
-        return cls(
-            scale=1.0, robust_ground=False, drop_ground_labels=False, match_within_labels=False,
-            unlabelled_attempt=False, height_gate=0.0, context_weight=0.0, moving_vote=True,
-            quick_keypoints=0, groups=200, group_size=400, weight_cutoff=6.0, cloud_check=False,
-            refinement_rounds=1, local_refinement=False, rival_radius=0.0, min_confidence=0.0)
+        """Return the paper: its steps, and what it does not print as in the default."""
+        return cls().paper_steps()
+
+    @classmethod
+    def kitti_protocol(cls) -> Self:
+        """Return the paper behind the front end that its relatives print for KITTI.
+
+        Voxels of 0.3 m, normals of 0.6 m, descriptors of 1.5 m, 8,000 points of each scan.
+        """
+        return cls.paper().replace(voxel_size=0.3, normal_radius=0.6, descriptor_radius=1.5,
+                                   max_correspondences=8000)
+
+    def paper_steps(self) -> Self:
+        """Return these settings with all that is beyond the paper off, to compare features by.
+
+        Lengths, thresholds and ablations stay; nothing is refused.
+        """
+        return self.replace(scale=self.scale or 1.0, **PAPER_STEPS)
 
 
 @lru_cache(maxsize=32)

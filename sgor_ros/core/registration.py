@@ -16,6 +16,7 @@ from .matching.correspondences import overlap_region
 from .result import Registration
 from .scan.preprocessing import at_scale
 from .scan.preprocessing import preprocess
+from .scan.scan import as_scan
 from .scan.scan import PreparedScan
 from .scan.scan import SemanticScan
 from .solver.consistency import filter_groups
@@ -31,18 +32,22 @@ from .solver.verification import verify
 from .trust.acceptance import compete
 from .trust.acceptance import judge_matches
 from .trust.acceptance import settle
+from .trust.hints import frame_hint
+from .trust.hints import scale_hint
 from .trust.rivals import Contest
 from .trust.view import View
 
 
-def register(source: SemanticScan | PreparedScan, target: SemanticScan | PreparedScan,
+def register(source: SemanticScan | PreparedScan | ArrayLike,
+             target: SemanticScan | PreparedScan | ArrayLike,
              config: SgorConfig | None = None) -> Registration:
     """Find the transformation between two overlapping scans, without an initial guess.
 
     Parameters
     ----------
-    source, target : SemanticScan or PreparedScan
-        Prepared scans are used as they are: prepare once, register often.
+    source, target : SemanticScan, PreparedScan or (N, 3) array
+        Prepared scans are used as they are: prepare once, register often. Arrays are points
+        without labels, metres.
     config : SgorConfig, optional
         ``SgorConfig.outdoor()`` where none is given.
 
@@ -50,10 +55,16 @@ def register(source: SemanticScan | PreparedScan, target: SemanticScan | Prepare
     -------
     Registration
         With ``success=False`` and a reason where the scans cannot be registered.
+
+    Raises
+    ------
+    InputError
+        What is no scan, or no configuration.
     """
-    config = config or SgorConfig()
+    config = SgorConfig.given(config)
+    scans = as_scan(source, 'source'), as_scan(target, 'target')
     with cores(config.threads):
-        return _register(source, target, config)
+        return _register(*scans, config)
 
 
 def _register(source: SemanticScan | PreparedScan, target: SemanticScan | PreparedScan,
@@ -79,8 +90,19 @@ def _register(source: SemanticScan | PreparedScan, target: SemanticScan | Prepar
                 *(f'target: {w}' for w in target.warnings))
     if any(labelled) and not all(labelled):
         warnings += (f'labels ignored: the {"target" if labelled[0] else "source"} has none',)
+    warnings += _hints(result, source, target, config)
     return replace(result, source_ground=source.ground, target_ground=target.ground,
                    warnings=warnings)
+
+
+def _hints(result: Registration, source: PreparedScan, target: PreparedScan,
+           config: SgorConfig) -> tuple[str, ...]:
+    """Return what may be wrong with the scans."""
+    hints = [scale_hint(result, config)]
+    if not result.success:
+        hints += [f'{side}: {hint}' for side, scan in (('source', source), ('target', target))
+                  if (hint := frame_hint(scan.scan.points, config))]
+    return tuple(filter(None, hints))
 
 
 def _attempts(config: SgorConfig, *, labelled: bool, level: bool) -> Iterator[SgorConfig]:
@@ -161,7 +183,7 @@ def register_correspondences(source_points: ArrayLike, target_points: ArrayLike,
     InputError
         Shapes that do not fit, or values that are not finite.
     """
-    config = config or SgorConfig()
+    config = SgorConfig.given(config)
     with cores(config.threads):
         correspondences = given_correspondences(source_points, target_points, source_labels,
                                                 target_labels, config)

@@ -5,10 +5,11 @@ from dataclasses import field
 import numpy as np
 from numpy.typing import NDArray
 
+from .common.se3 import angle
 from .scan.ground import Ground
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Placement:
     """One way to lay the source on the target that the clouds do not rule out.
 
@@ -28,8 +29,11 @@ class Placement:
     degenerate: NDArray[np.float64]
     evidence: dict[str, float]
 
+    def __repr__(self) -> str:
+        return f'Placement({_moved(self.T_target_source)})'
 
-@dataclass(frozen=True, eq=False)
+
+@dataclass(frozen=True, eq=False, repr=False)
 class Registration:
     """What `register` found out.
 
@@ -98,3 +102,21 @@ class Registration:
     evidence: dict[str, float] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
     timings: dict[str, float] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        """Return what a person wants to know first; the rest is in the attributes."""
+        told = [('registered' if self.success else f'not registered: {self.reason}'),
+                f'confidence {self.confidence:.2f}, {int(self.inliers.sum())} inliers of '
+                f'{len(self.inliers)} correspondences']
+        if self.T_target_source is not None:
+            rows = np.array2string(self.T_target_source, precision=4, suppress_small=True,
+                                   prefix='    T_target_source ')
+            told += [f'{"" if self.success else "refused: "}{_moved(self.T_target_source)}',
+                     f'T_target_source {rows}']
+        told += [f'or else {_moved(other.T_target_source)}' for other in self.alternatives]
+        told += [f'warning: {warning}' for warning in self.warnings]
+        return 'Registration(' + '\n    '.join(told) + ')'
+
+
+def _moved(T: NDArray[np.float64]) -> str:
+    return f'moved {np.linalg.norm(T[:3, 3]):.2f} m, turned {np.degrees(angle(T[:3, :3])):.1f} deg'

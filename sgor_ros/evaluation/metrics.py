@@ -98,19 +98,30 @@ def inlier_scores(source_points: ArrayLike, target_points: ArrayLike, T_estimate
     InlierScores
         A score with nothing to divide by is 0.
     """
-    source = np.asarray(source_points, np.float64)
-    target = np.asarray(target_points, np.float64)
+    kept = np.flatnonzero(_agree(source_points, target_points, T_estimate, threshold))
+    return kept_scores(source_points, target_points, kept, T_truth, threshold)
 
-    def agree(T: ArrayLike) -> NDArray[np.bool_]:
-        moved = se3.transform(np.asarray(T, np.float64), source)
-        return np.asarray(np.linalg.norm(moved - target, axis=1) < threshold)
 
-    kept, true = agree(T_estimate), agree(T_truth)
-    both = float(np.sum(kept & true))
-    precision = both / max(int(kept.sum()), 1)
+def kept_scores(source_points: ArrayLike, target_points: ArrayLike, kept: ArrayLike,
+                T_truth: ArrayLike, threshold: float) -> InlierScores:
+    """Compare the matches that a method kept, rows (M,), with the inliers of the truth.
+
+    The other arguments and the result are those of `inlier_scores`.
+    """
+    true = _agree(source_points, target_points, T_truth, threshold)
+    rows = np.asarray(kept, np.intp)
+    both = float(np.sum(true[rows]))
+    precision = both / max(len(rows), 1)
     recall = both / max(int(true.sum()), 1)
     f1 = 2 * precision * recall / (precision + recall) if both else 0.0
     return InlierScores(precision, recall, f1)
+
+
+def _agree(source: ArrayLike, target: ArrayLike, T: ArrayLike, threshold: float
+           ) -> NDArray[np.bool_]:
+    moved = se3.transform(np.asarray(T, np.float64), np.asarray(source, np.float64))
+    return np.asarray(
+        np.linalg.norm(moved - np.asarray(target, np.float64), axis=1) < threshold)
 
 
 @dataclass(frozen=True)

@@ -215,11 +215,11 @@ def save(folder: Path, text: str, records: Sequence[dict[str, Any]], setup: dict
         writer = csv.DictWriter(file, list(records[0]))
         writer.writeheader()
         writer.writerows(records)
-    document = {**setup, 'environment': describe_environment(PACKAGES), 'revision': _revision()}
+    document = {**setup, 'environment': describe_environment(PACKAGES), 'revision': revision()}
     (folder / 'run.json').write_text(json.dumps(document, indent=2, default=str) + '\n')
 
 
-def _revision() -> str:
+def revision() -> str:
     """Return the git commit that the package runs from, or that there is none."""
     done = subprocess.run(['git', '-C', str(Path(__file__).parent), 'describe', '--always',
                            '--dirty', '--abbrev=12'], capture_output=True, text=True, check=False)

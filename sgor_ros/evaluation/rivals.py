@@ -53,18 +53,6 @@ def kiss_matcher(source: Points, target: Points, voxel_m: float) -> Answer:
     return Answer(T, seconds, bool(solution.valid), float(matcher.get_num_final_inliers()))
 
 
-def kiss_matcher_solver(source: Array, target: Array, voxel_m: float) -> Array | None:
-    """Prune and solve (N, 3) matches as KISS-Matcher does with its own; None if not valid."""
-    from kiss_matcher import KISSMatcher
-    from kiss_matcher import KISSMatcherConfig
-    solution = KISSMatcher(KISSMatcherConfig(voxel_m)).prune_and_solve(
-        source.astype(np.float32), target.astype(np.float32))
-    if not solution.valid:
-        return None
-    return se3.compose(np.asarray(solution.rotation, np.float64),
-                       np.asarray(solution.translation, np.float64).reshape(3))
-
-
 def ransac(source: Points, target: Points, voxel_m: float) -> Answer:
     """RANSAC on FPFH as in the example of Open3D, ``registration_ransac.py``."""
     import open3d as o3d

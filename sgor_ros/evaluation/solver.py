@@ -27,10 +27,11 @@ from ..core.registration import register_correspondences
 from ..core.scan.preprocessing import preprocess
 from ..core.scan.scan import SemanticScan
 from ..core.solver.graph import consistency_graph
+from .methods import packages
+from .methods import problem
 from .metrics import rotation_error_deg
 from .metrics import translation_error_m
 from .pairs import Pair
-from .rivals import kiss_matcher_solver
 
 Array = NDArray[np.float64]
 Dense = Callable[..., Array]
@@ -133,7 +134,8 @@ def run_solver(sets: Sequence[Matches], config: SgorConfig, runs: int, *, rivals
     solvers: dict[str, Callable[[Matches], Array | None]] = {
         name: partial(_solve, config=c) for name, c in configs.items()}
     if rivals:
-        solvers['KISS-Matcher'] = lambda m: kiss_matcher_solver(m.source, m.target, FINE_VOXEL_M)
+        solvers["KISS-Matcher's solver"] = lambda m: packages.kiss_matcher_solver(
+            problem.Matches.of(m.source, m.target, config.tau_1)).T_target_source
     return [row for matches in tqdm(sets, unit='set', disable=None)
             for row in _timed(matches, solvers, runs, config)]
 
@@ -145,7 +147,7 @@ def run_dense(sets: Sequence[Matches], dense: Dense) -> list[Solved]:
     solvers: dict[str, Callable[[Matches], Any]] = {
         f'dense numpy, {DENSE_GROUPS} groups': lambda m: dense(
             m.source, m.target, config.sigma_d, config.weight_cutoff, config.groups,
-            config.group_size, config.group_keep, config.tau_1),
+            config.group_size, config.group_keep, config.tau_1, config.key_spacing),
         f'SGOR, {DENSE_GROUPS} groups': partial(_solve, config=config)}
     return [row for matches in tqdm(sets, 'dense', unit='set', disable=None)
             for row in _timed(matches, solvers, 1, config)]

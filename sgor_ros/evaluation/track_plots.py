@@ -7,6 +7,13 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from ..io.colours import CLASSES
+from ..io.colours import ESTIMATE
+from ..io.colours import GROUND
+from ..io.colours import LIMIT
+from ..io.colours import LOST
+from ..io.colours import SURE
+from ..io.colours import TRUTH
 from ..io.plots import new_figure
 from ..io.plots import save
 from .metrics import travelled_m
@@ -14,15 +21,6 @@ from .track import TrackErrors
 
 Array = NDArray[np.float64]
 
-TRUTH, ESTIMATE, LIMIT, LOST, SURE = '#111111', '#ff5a1f', '#888888', '#c1121f', '#2a9d5c'
-# raw SemanticKITTI ids: name, colour; drawn in this order
-CLASSES = {
-    72: ('terrain', '#dfe9d3'), 40: ('road', '#c9c9cf'), 44: ('parking', '#c9c9cf'),
-    48: ('sidewalk', '#e6d9e2'), 49: ('floor', '#c9c9cf'), 52: ('structure', '#a9b7bd'),
-    50: ('building', '#8a7462'), 51: ('fence', '#c49a6c'), 70: ('vegetation', '#74a65a'),
-    71: ('trunk', '#6b4a2b'), 10: ('car', '#3d7dc4'), 80: ('pole', '#b33c86'),
-    81: ('traffic sign', '#e0457b'), 99: ('other', '#777777')}
-GROUND = (72, 40, 44, 48, 49)
 MARGIN_M = 22.0
 # of the longer side, so that a straight drive is no picture of one line's height
 SQUARE_MARGIN = 0.05

@@ -5,6 +5,11 @@ from pathlib import Path
 from matplotlib.figure import Figure
 import numpy as np
 
+from ..io.colours import BLUE
+from ..io.colours import GREY
+from ..io.colours import RIGHT
+from ..io.colours import STRANGE
+from ..io.colours import WRONG
 from .plots import DPI
 from .run import Row
 from .trust import BINS
@@ -30,16 +35,16 @@ def plot_reliability(path: Path, rows: Sequence[Row], methods: Sequence[str], de
     for (top, bottom), name in zip(grid.T, methods, strict=True):
         own = [row for row in rows if row.method == name]
         bins = reliability(own)
-        top.plot((0, 100), (0, 100), ':', color='gray', label='says what it is')
+        top.plot((0, 100), (0, 100), ':', color=GREY, label='says what it is')
         top.plot([100 * each.mean for each in bins],
-                 [100 * each.right / each.answers for each in bins], 'o-', color='#1f5fa8',
+                 [100 * each.right / each.answers for each in bins], 'o-', color=BLUE,
                  label='answers, refused ones too')
         top.set(ylabel='share that is right [%]', ylim=(-3, 103))
         top.set_title(name, loc='left', weight='bold')
         _histogram = {
-            'right': ([row for row in own if row.right and row.within], '#2a7f3f'),
-            'wrong answer': ([row for row in own if row.right and not row.within], '#e0a100'),
-            'different places': ([row for row in own if not row.right], '#c0392b')}
+            'right': ([row for row in own if row.right and row.within], RIGHT),
+            'wrong answer': ([row for row in own if row.right and not row.within], WRONG),
+            'different places': ([row for row in own if not row.right], STRANGE)}
         shown = {kind: ([100 * row.confidence for row in part if not np.isnan(row.confidence)],
                         colour) for kind, (part, colour) in _histogram.items()}
         bottom.hist([values for values, _ in shown.values()], 100 * np.array(BINS), stacked=True,

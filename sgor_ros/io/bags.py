@@ -1,7 +1,7 @@
 """Bags without ROS, by rosbags: ROS 1 .bag, ROS 2 sqlite3 and mcap."""
 from collections.abc import Callable
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -20,11 +20,16 @@ from rosbags.typesys import get_typestore
 from rosbags.typesys import Stores
 
 from ..core.common.settings import InputError
+from .bounded import BoundedPath
+from .broken import readable
 from .label_field import field_names
 from .label_field import label_field_of
 from .messages import matrix_of
 from .messages import stamp_ns_of
 
+MENDS = {'.mcap': 'mcap recover', '.bag': 'rosbag reindex', '.db3': 'ros2 bag reindex',
+         '': 'ros2 bag reindex (or mcap recover, for its .mcap)'}
+KNOWN = get_typestore(Stores.ROS2_JAZZY)
 CLOUD_TYPE = 'sensor_msgs/msg/PointCloud2'
 ODOMETRY_TYPE = 'nav_msgs/msg/Odometry'
 BAG_FILES = ('.mcap', '.db3', '.bag')
@@ -71,17 +76,18 @@ class BagReader:
     """
 
     def __init__(self, path: str | Path) -> None:
-        self.path = Path(path)
+        self.path = BoundedPath(path)
         if not self.path.exists():
             raise InputError(f'{path}: no such bag')
-        with _readable(self.path):
+        with self._readable():
             self._reader = AnyReader(
-                [self.path], default_typestore=get_typestore(Stores.ROS2_JAZZY))
+                [self.path], default_typestore=KNOWN)
 
     def __enter__(self) -> Self:
         """Open the bag."""
-        with _readable(self.path):
+        with self._readable():
             self._reader.open()
+            self._topics = self._count_clouds()
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
@@ -91,11 +97,7 @@ class BagReader:
 
     def cloud_topics(self) -> dict[str, int]:
         """Return the PointCloud2 topics that have messages, and how many."""
-        topics: dict[str, int] = {}
-        for connection in self._reader.connections:
-            if connection.msgtype == CLOUD_TYPE and connection.msgcount:
-                topics[connection.topic] = topics.get(connection.topic, 0) + connection.msgcount
-        return topics
+        return dict(self._topics)
 
     def find_topic(self, label_field: str) -> str:
         """Return the one topic of labelled clouds, or the one topic of clouds.
@@ -146,7 +148,7 @@ class BagReader:
         """Iterate over the odometry of a topic, if there is any: stamp, (4, 4) pose."""
         connections = [c for c in self._reader.connections
                        if c.topic == topic and c.msgtype == ODOMETRY_TYPE]
-        with _readable(self.path):
+        with self._readable():
             for _, _, raw in self._reader.messages(connections) if connections else ():
                 message: Any = self._reader.deserialize(raw, ODOMETRY_TYPE)
                 yield stamp_ns_of(message.header), matrix_of(message.pose.pose)
@@ -154,9 +156,27 @@ class BagReader:
     def _iterate(self, connections: list[Connection], at_ns: int | None
                  ) -> Iterator[RecordedCloud]:
         stop = None if at_ns is None else at_ns + 1
-        with _readable(self.path):
+        with self._readable():
             for _, time_ns, raw in self._reader.messages(connections, at_ns, stop):
                 yield RecordedCloud(time_ns, partial(self._read, raw))
+
+    def _count_clouds(self) -> dict[str, int]:
+        topics: dict[str, int] = {}
+        for kind in (CLOUD_TYPE, 'sensor_msgs/msg/PointField'):
+            # a bag brings its own definitions along
+            told = self._reader.typestore.fielddefs.get(kind, KNOWN.fielddefs[kind])[1]
+            if told != KNOWN.fielddefs[kind][1]:
+                raise InputError(f'{self.path}: its {kind} has other fields than that of ROS')
+        for connection in self._reader.connections:
+            if not isinstance(connection.topic, str):    # sqlite3 keeps anything in any column
+                raise InputError(f'{self.path}: {connection.topic!r} is no name of a topic')
+            if connection.msgtype == CLOUD_TYPE and connection.msgcount:
+                topics[connection.topic] = topics.get(connection.topic, 0) + connection.msgcount
+        return topics
+
+    def _readable(self) -> AbstractContextManager[None]:
+        return readable(self.path, 'if it broke off while it was recorded, '
+                        f'{MENDS.get(self.path.suffix, MENDS[""])} mends it')
 
     def _is_labelled(self, topic: str, label_field: str) -> bool:
         try:
@@ -166,7 +186,7 @@ class BagReader:
         return label_field_of(first, label_field) in field_names(first)
 
     def _read(self, raw: bytes) -> tuple[int, str, Any]:
-        with _readable('a message of the bag'):
+        with readable('a message of the bag'):
             message: Any = self._reader.deserialize(raw, CLOUD_TYPE)
             return stamp_ns_of(message.header), message.header.frame_id, message
 
@@ -186,7 +206,7 @@ class BagWriter:
     """
 
     def __init__(self, path: str | Path) -> None:
-        self._store = get_typestore(Stores.ROS2_JAZZY)
+        self._store = KNOWN
         self._connections: dict[str, Connection] = {}
         try:
             self._writer = Writer(
@@ -217,15 +237,3 @@ class BagWriter:
                 topic, kind, typestore=self._store)
         self._writer.write(self._connections[topic], time_ns,
                            self._store.serialize_cdr(message, kind))
-
-
-@contextmanager
-def _readable(what: Path | str) -> Iterator[None]:
-    """Turn what a parser of broken bytes raises, which can be anything, into one error."""
-    try:
-        yield
-    except InputError:
-        raise
-    except Exception as error:
-        raise InputError(f'{what}: cannot be read: '
-                         f'{str(error) or type(error).__name__}') from error

@@ -1,6 +1,7 @@
 """The picture of a registration; matplotlib is loaded when it is drawn."""
 from collections.abc import Sequence
 from pathlib import Path
+import textwrap
 from typing import Any
 from typing import Literal
 
@@ -12,14 +13,19 @@ from ..core.common.settings import InputError
 from ..core.result import Registration
 from ..core.scan.ground import Ground
 from ..core.scan.scan import SemanticScan
+from .colours import INLIER
+from .colours import REJECTED
+from .colours import SOURCE
+from .colours import TARGET
 
 Array = NDArray[np.float64]
 
-BLUE, ORANGE, GREEN, RED = '#2f6db3', '#e08a1e', '#2a9d5c', '#d1495b'
 # what the eye still tells apart in a picture of this size
 SHOWN_POINTS = 40000
 SHOWN_REJECTED = 250
 SHOWN_INLIERS = 400
+# letters over one of two panels
+CAPTION_WIDTH = 75
 # about as high as a kerb: only for the picture
 GROUND_BAND_M = 0.3
 # this share of the points is inside the picture of a scan
@@ -47,20 +53,21 @@ def plot_registration(path: str | Path, title: str, source: SemanticScan, target
     low = [_on_ground(scan.points, plane)
            for scan, plane in ((source, result.source_ground), (target, result.target_ground))]
     for axes, points in ((left, source.points), (right, moved)):
-        _draw_cloud(axes, target.points, low[1], BLUE, 'target')
-        _draw_cloud(axes, points, low[0], ORANGE, 'source')
+        _draw_cloud(axes, target.points, low[1], TARGET, 'target')
+        _draw_cloud(axes, points, low[0], SOURCE, 'source')
     _draw_matches(left, result.source_points, result.target_points, result.inliers)
-    for label, pose, colour in (('target', np.eye(4), BLUE), ('source', T, ORANGE)):
-        right.plot(*pose[:2, 3], 'o', ms=8, mfc=colour, mec='white', mew=1.5, zorder=5,
-                   label=f'{label} sensor')
-    left.set_title(f'as they came; {int(result.inliers.sum())} inliers (green) of '
-                   f'{len(result.inliers)} matches')
-    right.set_title('aligned' if result.success else f'not registered: {result.reason}; '
-                    f'{"as they came" if result.T_target_source is None else "best candidate"}')
+    for axes, placed in ((left, np.eye(4)), (right, T)):
+        for pose, colour in ((np.eye(4), TARGET), (placed, SOURCE)):
+            axes.plot(*pose[:2, 3], 'o', ms=8, mfc='white', mec=colour, mew=2.5, zorder=5)
+    left.plot([], [], 'o', ms=8, mfc='white', mec='black', mew=1.5, label='sensor')
+    _caption(left, 'as they came')
+    _caption(right, 'aligned' if result.success else f'not registered: {result.reason}; '
+             f'{"as they came" if result.T_target_source is None else "best candidate"}')
     _frame_clouds((left, right), np.vstack((source.points, target.points, moved))[:, :2])
     for axes in (left, right):
         axes.set(aspect='equal', xlabel='x [m]', ylabel='y [m]')
-        axes.legend(loc='upper right', markerscale=1.0, framealpha=0.9)
+    handles, labels = left.get_legend_handles_labels()
+    figure.legend(handles, labels, loc='outside lower center', ncols=6, frameon=False)
     save(figure, path)
 
 
@@ -101,12 +108,22 @@ def _draw_cloud(axes: Any, points: NDArray[Any], low: NDArray[np.bool_], colour:
 
 
 def _draw_matches(axes: Any, source: Array, target: Array, inliers: NDArray[np.bool_]) -> None:
+    """Draw the matches as lines, no more than the eye takes in, and tell how many there are."""
     from matplotlib.collections import LineCollection
     ends = np.stack((source[:, :2], target[:, :2]), axis=1)
-    for part, limit, colour, width, alpha in ((ends[~inliers], SHOWN_REJECTED, RED, 0.5, 0.3),
-                                              (ends[inliers], SHOWN_INLIERS, GREEN, 0.9, 0.8)):
-        axes.add_collection(LineCollection(list(part[::max(1, len(part) // limit)]),
-                                           colors=colour, linewidths=width, alpha=alpha))
+    for name, part, limit, colour, width, alpha in (
+            ('rejected', ends[~inliers], SHOWN_REJECTED, REJECTED, 0.5, 0.3),
+            ('inliers', ends[inliers], SHOWN_INLIERS, INLIER, 0.9, 0.8)):
+        step = -(-len(part) // limit) or 1
+        axes.add_collection(LineCollection(list(part[::step]), colors=colour, linewidths=width,
+                                           alpha=alpha))
+        shown = f', one in {step} drawn' if step > 1 else ''
+        axes.plot([], [], '-', color=colour, lw=2, label=f'{name} ({len(part)}{shown})')
+
+
+def _caption(axes: Any, text: str) -> None:
+    """Set a title that stays over its own panel."""
+    axes.set_title(textwrap.fill(text, CAPTION_WIDTH), loc='left')
 
 
 def _frame_clouds(panels: Sequence[Any], xy: NDArray[Any]) -> None:

@@ -19,6 +19,8 @@ FLOATS = ('f4', 'f8')
 
 # how far from a whole number a label may be that came as a float
 LABEL_ROUNDING = 1e-3
+# ids have 32 bits
+LARGEST_LABEL = 2.0**32
 
 
 def decode(message: Any, label_field: str) -> SemanticScan:
@@ -76,10 +78,11 @@ def _records(message: Any, names: tuple[str, ...]) -> NDArray[Any]:
 
 def _format(message: Any, name: str) -> tuple[str, int]:
     """Return the numpy format and the offset of a field."""
-    field = next((f for f in message.fields if f.name == name), None)
-    if field is None:
-        raise InputError(f'field {name}: the cloud has none; its fields are '
+    found = [f for f in message.fields if f.name == name]
+    if len(found) != 1:
+        raise InputError(f'field {name}: the cloud has {len(found) or "none"}; its fields are '
                          f'{", ".join(field_names(message)) or "none at all"}')
+    field = found[0]
     code = FORMATS.get(field.datatype)
     if code is None or (name in ('x', 'y', 'z') and code not in FLOATS):
         raise InputError(f'field {name}: unsupported datatype {field.datatype}'
@@ -89,8 +92,7 @@ def _format(message: Any, name: str) -> tuple[str, int]:
     return ('>' if message.is_bigendian else '<') + code, field.offset
 
 
-def whole_numbers(labels: NDArray[Any], points: NDArray[np.float32],
-                  name: str) -> NDArray[np.int64]:
+def whole_numbers(labels: NDArray[Any], points: NDArray[Any], name: str) -> NDArray[np.int64]:
     """Return (N,) labels as integers; floats must be whole where the point is finite.
 
     Raises
@@ -101,7 +103,9 @@ def whole_numbers(labels: NDArray[Any], points: NDArray[np.float32],
     if labels.dtype.kind != 'f':
         return labels.astype(np.int64)
     labels = np.where(np.isfinite(points).all(axis=1), labels, 0)
-    bad = np.flatnonzero(~(np.abs(labels - np.rint(labels)) < LABEL_ROUNDING))
+    with np.errstate(invalid='ignore'):    # infinity less infinity
+        whole = (np.abs(labels - np.rint(labels)) < LABEL_ROUNDING) & (abs(labels) < LARGEST_LABEL)
+    bad = np.flatnonzero(~whole)
     if bad.size:
         raise InputError(f'{name}: {labels[bad[0]]} at point {bad[0]} is not a whole '
                          'number, so not a class id')

@@ -52,8 +52,8 @@ class Tracker:
 
     def __init__(self, config: SgorConfig | None = None,
                  tracker_config: TrackerConfig | None = None) -> None:
-        self.config = config or SgorConfig()
-        self.tracker_config = tracker_config or TrackerConfig()
+        self.config = SgorConfig.given(config)
+        self.tracker_config = TrackerConfig.given(tracker_config)
         self._late = 0
         self._tracks = 0
         self.reset()

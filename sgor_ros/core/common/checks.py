@@ -15,12 +15,26 @@ def as_points(points: ArrayLike, name: str, dtype: Any = np.float64) -> NDArray[
     ------
     InputError
     """
-    try:
-        array = np.asarray(points).astype(dtype, copy=False)
-    except (TypeError, ValueError) as error:
-        raise InputError(f'{name}: not an array of numbers: {error}') from error
+    array = as_numbers(points, name)
     if array.ndim != 2 or array.shape[1] != 3:
         raise InputError(f'{name}: expected an (N, 3) array, got shape {array.shape}')
+    with np.errstate(over='ignore'):    # what is too large becomes infinite, so it is dropped
+        return array.astype(dtype, copy=False)
+
+
+def as_numbers(values: ArrayLike, name: str) -> NDArray[Any]:
+    """Return an array of integers or floats, or say what else `name` holds.
+
+    Raises
+    ------
+    InputError
+    """
+    try:
+        array = np.asarray(values)
+    except (TypeError, ValueError) as error:
+        raise InputError(f'{name}: not an array of numbers: {error}') from error
+    if array.dtype.kind not in 'iuf':    # to numpy, times and complex numbers are numbers too
+        raise InputError(f'{name}: not an array of numbers, but of {array.dtype}')
     return array
 
 
@@ -31,10 +45,13 @@ def as_labels(labels: ArrayLike, length: int, name: str) -> NDArray[np.int64]:
     ------
     InputError
     """
-    array = np.asarray(labels)
+    try:
+        array = np.asarray(labels)
+    except (TypeError, ValueError) as error:
+        raise InputError(f'{name}: expected integers: {error}') from error
     if array.shape != (length,):
         raise InputError(f'{name}: expected one a point, ({length},), got shape {array.shape}')
-    if not np.issubdtype(array.dtype, np.integer):
+    if array.dtype.kind not in 'iu':    # to numpy, spans of time are integers
         raise InputError(f'{name}: expected integers, got {array.dtype}')
     return array.astype(np.int64, copy=False)
 

@@ -3,6 +3,7 @@ import dataclasses
 from dataclasses import dataclass
 from dataclasses import field
 import math
+import re
 from typing import Any
 from typing import cast
 from typing import Self
@@ -13,7 +14,14 @@ Value = bool | int | float | str
 
 
 class InputError(ValueError):
-    """What the caller handed in cannot be used; the message names the field and the value."""
+    """What the caller handed in cannot be used; the message names the field and the value.
+
+    It is one line that a terminal shows as it is, whatever the value holds.
+    """
+
+    def __init__(self, message: str) -> None:
+        line = re.sub(r'\s*\n\s*', ' ', message.strip())
+        super().__init__(''.join(c if c.isprintable() else ascii(c)[1:-1] for c in line))
 
 
 def setting(default: Value, meaning: str, unit: str = '', *, minimum: float | None = None,
@@ -99,6 +107,22 @@ class Settings:
         """Return the fields in their order, with defaults, units and bounds."""
         return tuple(Setting(f.name, cast(Value, f.default), **f.metadata)
                      for f in dataclasses.fields(cls))
+
+    @classmethod
+    def given(cls, config: Self | None) -> Self:
+        """Return a configuration as a caller hands it in; the defaults where that is None.
+
+        Raises
+        ------
+        InputError
+            Something else, such as a dict.
+        """
+        if config is None:
+            return cls()
+        if isinstance(config, cls):
+            return config
+        advice = f'; {cls.__name__}(**values) makes one of it' if isinstance(config, dict) else ''
+        raise InputError(f'config: expected {cls.__name__}, got {type(config).__name__}{advice}')
 
     @classmethod
     def from_values(cls, values: dict[str, Any]) -> Self:

@@ -90,6 +90,14 @@ def overlap_region(source: Features, target: Features) -> tuple[Features, Featur
     return source if p.all() else source[p], target if q.all() else target[q]
 
 
+def sampled(source: Features, target: Features, config: SgorConfig) -> tuple[Features, Features]:
+    """Draw `max_correspondences` keypoints of each, without replacement; the order stays."""
+    rng = np.random.default_rng(config.sampling_seed)
+    p, q = (np.sort(rng.permutation(len(each.points))[:config.max_correspondences])
+            for each in (source, target))
+    return source[p], target[q]
+
+
 def match(source: Features, target: Features, config: SgorConfig) -> Correspondences:
     """Find for each source keypoint the target keypoint with the nearest descriptor.
 
@@ -104,6 +112,8 @@ def match(source: Features, target: Features, config: SgorConfig) -> Corresponde
     if source.descriptors.shape[1] != target.descriptors.shape[1]:
         raise InputError(f'descriptors: source has {source.descriptors.shape[1]} columns, target '
                          f'{target.descriptors.shape[1]}')
+    if config.sampled_keypoints:
+        source, target = sampled(source, target, config)
     source = source[thin(len(source.points), config.max_correspondences)]
     within = config.match_within_labels and config.semantics != 'none'
     described, candidates = _joint_descriptors(source, target, config)

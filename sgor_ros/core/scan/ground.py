@@ -1,5 +1,6 @@
 """Secondary ground segmentation (Sec. III-B, Eq. 2 and 3; normal by Eq. 16)."""
 from dataclasses import dataclass
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -44,7 +45,7 @@ class Ground:
 
 def segment_ground(cloud: VoxelCloud, ground_classes: frozenset[int],
                    config: SgorConfig) -> Ground | None:
-    """Find the ground by labels, plane, distance to the plane, and plane again.
+    """Find the ground by labels, plane by consensus, distance to it, and plane again.
 
     Returns
     -------
@@ -55,6 +56,33 @@ def segment_ground(cloud: VoxelCloud, ground_classes: frozenset[int],
     if by_label.sum() >= config.min_ground_points:
         return _by_labels(cloud.points, by_label, config)
     return _by_geometry(cloud.points, config)
+
+
+def printed_ground(cloud: VoxelCloud, points: NDArray[np.float32], labels: NDArray[np.uint8],
+                   ground_classes: frozenset[int], config: SgorConfig) -> Ground | None:
+    """Find the ground as printed: SVD of all (N, 3) points of the ground, distance, SVD again.
+
+    Returns
+    -------
+    Ground or None
+        None where the labels show no ground.
+    """
+    by_label = np.isin(labels, list(ground_classes))
+    mask: NDArray[np.bool_] = np.isin(cloud.labels, list(ground_classes))
+    if mask.sum() < config.min_ground_points:
+        return None
+    exact = points.astype(np.float64)
+    normal, offset = fit_plane(exact[by_label])
+    if not config.secondary_ground:
+        return Ground(normal, offset, mask, 'labels')
+    near, near_voxels = (np.abs(each @ normal + offset) < config.sigma_g
+                         for each in (exact, cloud.points))
+    if config.labelled_ground:
+        near, near_voxels = near & by_label, near_voxels & mask
+    if near_voxels.sum() < config.min_ground_points:
+        return None
+    normal, offset = fit_plane(exact[near])
+    return Ground(normal, offset, near_voxels, 'labels')
 
 
 def fit_plane(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
@@ -75,19 +103,15 @@ def fit_plane(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
 
 def _by_labels(points: NDArray[np.float64], by_label: NDArray[np.bool_],
                config: SgorConfig) -> Ground | None:
-    if config.robust_ground and config.secondary_ground:
-        # wrong labels and far slopes would tilt the first plane
-        near = np.linalg.norm(points, axis=1) < config.ground_radius
-        seed = by_label & near if (by_label & near).sum() >= config.min_ground_points else by_label
-        return _by_consensus(points, points[seed], 'labels', config)
-    normal, offset = fit_plane(points[by_label])
     if not config.secondary_ground:
-        return Ground(normal, offset, by_label, 'labels')
-    near = np.abs(points @ normal + offset) < config.sigma_g
-    if near.sum() < config.min_ground_points:
-        return None
-    normal, offset = fit_plane(points[near])
-    return Ground(normal, offset, near, 'labels')
+        return Ground(*fit_plane(points[by_label]), by_label, 'labels')
+    # wrong labels and far slopes would tilt the first plane
+    near = np.linalg.norm(points, axis=1) < config.ground_radius
+    seed = by_label & near if (by_label & near).sum() >= config.min_ground_points else by_label
+    ground = _by_consensus(points, points[seed], 'labels', config)
+    if ground is not None and config.labelled_ground:
+        ground = replace(ground, mask=ground.mask & by_label)
+    return ground
 
 
 def _by_geometry(points: NDArray[np.float64], config: SgorConfig) -> Ground | None:

@@ -111,7 +111,8 @@ def label_convention(name: str) -> LabelConvention:
                          f'({", ".join(dict.fromkeys(known))}) nor a YAML file')
     try:
         return _parse(name, yaml.safe_load(path.read_text()))
-    except (yaml.YAMLError, KeyError, TypeError, ValueError, AttributeError) as error:
+    except (yaml.YAMLError, LookupError, TypeError, ValueError, AttributeError, OverflowError,
+            RecursionError) as error:
         raise InputError(f'label_convention = {name!r}: {path} is not a label convention: '
                          f'{error!r}') from error
 
@@ -125,8 +126,8 @@ def _parse(name: str, table: dict[str, Any]) -> LabelConvention:
             and all(0 <= i < 2**16 for i in (*classes, *drop))):
         raise ValueError('ids must be in 0 to 65535 and classes in 0 to 255')
     mask = int(table.get('mask', 0xFFFFFFFF))
-    if mask < 0:
-        raise ValueError('mask must not be negative')    # so that a masked id never is
+    if not 0 <= mask <= 0xFFFFFFFF:    # not negative, so that a masked id never is
+        raise ValueError('mask must be in 0 to 0xFFFFFFFF: it must not be negative')
     return LabelConvention(
         name=name, mask=mask, classes=classes,
         names={int(k): str(v) for k, v in table['names'].items()},

@@ -8,6 +8,7 @@ from scipy.spatial import cKDTree
 
 from ..alignment import Surface
 from ..alignment import surface
+from ..common.checks import as_numbers
 from ..common.checks import finite_points
 from ..common.settings import InputError
 from ..common.stopwatch import Stopwatch
@@ -22,6 +23,7 @@ from .descriptors import regional_labels
 from .descriptors import unit_rows
 from .features import Features
 from .ground import Ground
+from .ground import printed_ground
 from .ground import segment_ground
 from .labels import label_convention
 from .labels import LabelConvention
@@ -29,6 +31,7 @@ from .labels import UNLABELLED
 from .neighbours import radius_neighbours
 from .scale import scale_of
 from .scale import STREET_VOXEL
+from .scan import as_scan
 from .scan import Given
 from .scan import PreparedScan
 from .scan import SemanticScan
@@ -41,14 +44,15 @@ from .voxels import VoxelCloud
 UNKNOWN_TOLD = 5
 
 
-def preprocess(scan: SemanticScan, config: SgorConfig | None = None, *,
+def preprocess(scan: SemanticScan | ArrayLike, config: SgorConfig | None = None, *,
                keypoints: ArrayLike | None = None, descriptors: ArrayLike | None = None,
                scale_before: float | None = None) -> PreparedScan:
     """Segment the ground and describe the rest of one scan, once for all its registrations.
 
     Parameters
     ----------
-    scan : SemanticScan
+    scan : SemanticScan or (N, 3) array
+        An array is points without labels, metres.
     config : SgorConfig, optional
         ``SgorConfig.outdoor()`` where none is given.
     keypoints : (V, 3) array, optional
@@ -65,12 +69,16 @@ def preprocess(scan: SemanticScan, config: SgorConfig | None = None, *,
     Raises
     ------
     InputError
-        Only one of keypoints and descriptors is given, or their lengths differ.
+        What is no scan or no configuration; only one of keypoints and descriptors is given, or
+        their lengths differ.
     """
-    config = config or SgorConfig()
+    config = SgorConfig.given(config)
+    semantic = as_scan(scan, 'scan')
+    if isinstance(semantic, PreparedScan):
+        raise InputError('scan: it has been preprocessed already')
     with cores(config.threads):
         given = None if keypoints is None and descriptors is None else (keypoints, descriptors)
-        return _prepare(scan, config, given, scale_before)
+        return _prepare(semantic, config, given, scale_before)
 
 
 def at_scale(prepared: PreparedScan, scale: float) -> PreparedScan:
@@ -103,13 +111,16 @@ def _prepare(scan: SemanticScan, asked: SgorConfig, given: Given | None,
     with clock('surface'):
         local = _fixed_surface(points, labels, convention, config)
     with clock('ground'):
-        ground = segment_ground(cloud, convention.ground, config)
+        ground = (segment_ground(cloud, convention.ground, config) if config.robust_ground else
+                  printed_ground(cloud, points, labels, convention.ground, config))
         if ground is not None and config.correspondence_preprocessing:
             cloud = cloud[~ground.mask]
     with clock('votes'):
         neighbours = radius_neighbours(cloud.points, config.vote_radius)
         regional = regional_labels(cloud, neighbours, config.vote_radius)
         keep = ~np.isin(regional, _unmatched_classes(convention, config))
+        if config.correspondence_preprocessing and config.drop_ground_labels == 'point':
+            keep &= ~np.isin(cloud.labels, list(convention.ground))    # S_n of Eq. 4
         cloud, regional = cloud[keep], regional[keep]
     if given is None:
         features, directions = _describe(cloud, regional, config, clock)
@@ -179,7 +190,7 @@ def _unknown_in_words(ids: NDArray[np.int64], unknown: list[int], convention: st
 def _unmatched_classes(convention: LabelConvention, config: SgorConfig) -> list[int]:
     """Return the regional labels that take no part in matching."""
     ground = (convention.ground if config.correspondence_preprocessing
-              and config.drop_ground_labels else frozenset())
+              and config.drop_ground_labels == 'regional' else frozenset())
     return sorted(ground if config.moving_vote else ground | convention.movable)
 
 
@@ -214,10 +225,7 @@ def _given(keypoints: ArrayLike | None, descriptors: ArrayLike | None, cloud: Vo
     if keypoints is None or descriptors is None:
         raise InputError('keypoints and descriptors: give both or none')
     points = finite_points(keypoints, 'keypoints')
-    try:
-        described = np.asarray(descriptors, np.float32)
-    except (TypeError, ValueError) as error:
-        raise InputError(f'descriptors: not an array of numbers: {error}') from error
+    described = as_numbers(descriptors, 'descriptors').astype(np.float32)
     if described.ndim != 2 or len(described) != len(points):
         raise InputError(f'descriptors: expected one row a keypoint, ({len(points)}, D), '
                          f'got shape {described.shape}')

@@ -19,7 +19,7 @@ Given = tuple[ArrayLike | None, ArrayLike | None]
 """Keypoints and descriptors of the caller, before they are checked."""
 
 
-@dataclass(frozen=True, eq=False, init=False)
+@dataclass(frozen=True, eq=False, init=False, repr=False)
 class SemanticScan:
     """One scan: points and, where there are any, their labels.
 
@@ -54,8 +54,12 @@ class SemanticScan:
     def __len__(self) -> int:
         return len(self.points)
 
+    def __repr__(self) -> str:
+        labels = '' if self.labels is None else f', {len(np.unique(self.labels))} label ids'
+        return f'SemanticScan({len(self)} points{labels})'
 
-@dataclass(frozen=True, eq=False)
+
+@dataclass(frozen=True, eq=False, repr=False)
 class PreparedScan:
     """Everything of one scan that does not depend on the other: the result of `preprocess`.
 
@@ -93,3 +97,25 @@ class PreparedScan:
     warnings: tuple[str, ...]
     timings: dict[str, float]
     given: Given | None = None
+
+    def __repr__(self) -> str:
+        return (f'PreparedScan({self.scan}, {len(self.features.points)} keypoints, '
+                f'scale {self.scale:g})')
+
+
+def as_scan(scan: SemanticScan | PreparedScan | ArrayLike,
+            name: str) -> SemanticScan | PreparedScan:
+    """Return a scan as it is, and (N, 3) points as one without labels.
+
+    Raises
+    ------
+    InputError
+        Naming `name`, what is neither.
+    """
+    if isinstance(scan, SemanticScan | PreparedScan):
+        return scan
+    try:
+        return SemanticScan(scan)
+    except InputError as error:
+        raise InputError(f'{name}: neither a SemanticScan nor an (N, 3) array of points '
+                         f'({error})') from error

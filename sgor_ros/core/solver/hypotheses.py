@@ -18,12 +18,13 @@ class Hypotheses:
     Attributes
     ----------
     T_target_source : (H, 4, 4) float64
-    kept : (H, k1) int64
-        Correspondences G'_l behind each; -1 where fewer were left.
+    union : (U,) int64
+        G' of Eq. 18: the filtered correspondences of all groups, each once, those of groups
+        without a hypothesis too.
     """
 
     T_target_source: NDArray[np.float64]
-    kept: NDArray[np.int64]
+    union: NDArray[np.int64]
 
 
 def hypothesise(correspondences: Correspondences, filtered: FilteredGroups) -> Hypotheses:
@@ -35,7 +36,7 @@ def hypothesise(correspondences: Correspondences, filtered: FilteredGroups) -> H
     kept = filtered.kept[enough]
     T = fit_transforms(correspondences.source[kept], correspondences.target[kept],
                        filtered.scores[enough].astype(np.float64))
-    return Hypotheses(T, kept)
+    return Hypotheses(T, np.unique(filtered.kept[filtered.kept >= 0]))
 
 
 def fit_transforms(source: NDArray[np.float64], target: NDArray[np.float64],

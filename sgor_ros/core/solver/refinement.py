@@ -35,7 +35,12 @@ def distances(T_target_source: NDArray[np.float64], source: NDArray[np.float64],
 
 def unobservable(source: NDArray[np.float64], target: NDArray[np.float64],
                  config: SgorConfig) -> str:
-    """Return why (K, 3) inliers do not hold a transformation, in words; empty where they do."""
+    """Return why (K, 3) inliers do not hold a transformation, in words; empty where they do.
+
+    Nothing is asked where `min_inliers` is 0 (the paper).
+    """
+    if config.min_inliers == 0:
+        return ''
     # several matches may end at the same point
     distinct = min(len(np.unique(points, axis=0)) for points in (source, target))
     if distinct < config.min_inliers:

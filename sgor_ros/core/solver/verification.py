@@ -58,9 +58,9 @@ def verify(hypotheses: Hypotheses, correspondences: Correspondences,
     cost = np.full(len(T), np.inf)
     if not passed.any():
         return Verdict(passed, cost, -cost, -1)
-    union = np.unique(hypotheses.kept[hypotheses.kept >= 0])
     cost[passed] = truncated_distance(
-        T[passed], correspondences.source[union], correspondences.target[union], config.sigma_d)
+        T[passed], correspondences.source[hypotheses.union],
+        correspondences.target[hypotheses.union], config.sigma_d)
     score = -cost
     if config.cloud_check and views is not None:
         score[passed] = rank(*views, T[passed])

@@ -8,12 +8,9 @@ from numpy.typing import NDArray
 
 from ...core.common import se3
 from ...core.common.settings import InputError
-from ..trajectories import read_kitti
+from .. import trajectories
 
 Array = NDArray[np.float64]
-
-MOST_SECONDS = 9e9
-"""What still fits into nanoseconds of 64 bits."""
 
 STAMP_DIGITS = 16
 """A number of so many digits is a time in nanoseconds, not a count of scans."""
@@ -92,17 +89,8 @@ def read_times(path: Path, scans: Sequence[Path]) -> NDArray[np.int64]:
     InputError
         No such file, other than one number a line, or times that do not increase.
     """
-    try:
-        seconds = np.loadtxt(path, ndmin=2)
-    except (OSError, ValueError) as error:
-        raise InputError(f'{path}: no times: {error}') from error
-    if seconds.shape[1:] != (1,):
-        raise InputError(f'{path}: expected one number a line, the seconds of a scan')
-    seconds = seconds[rows_of(path, len(seconds), scans), 0]
-    bad = np.flatnonzero(~((seconds >= 0) & (seconds < MOST_SECONDS)))
-    if bad.size:
-        raise InputError(f'{path}: {seconds[bad[0]]} s for {scans[bad[0]].name} is no time')
-    return increasing([round(value * 1e9) for value in seconds.tolist()], path, scans)
+    stamps_ns = trajectories.read_times(path)
+    return np.array([stamps_ns[row] for row in rows_of(path, len(stamps_ns), scans)], np.int64)
 
 
 def stamps_of_names(scans: Sequence[Path]) -> NDArray[np.int64] | None:
@@ -144,12 +132,12 @@ def read_poses(path: Path, scans: Sequence[Path], calibration: Path | None = Non
     InputError
         A file that is none, counts that differ, or rows that are no rigid motions.
     """
-    poses = read_kitti(path)
+    poses = trajectories.read_kitti(path)
     poses = poses[rows_of(path, len(poses), scans)]
     check_rigid(path, poses)
     if calibration is None:
         return poses
-    T_camera_sensor = read_calibration(calibration)
+    T_camera_sensor = trajectories.read_calibration(calibration)
     return np.asarray(se3.inverse(T_camera_sensor) @ poses @ T_camera_sensor)
 
 
@@ -157,25 +145,6 @@ def calibration(folder: Path) -> Path | None:
     """Return the calib.txt of a folder, if it has one."""
     path = folder / 'calib.txt'
     return path if path.is_file() else None
-
-
-def read_calibration(path: Path) -> Array:
-    """Return Tr of a calib.txt, which maps points of the LiDAR into the left camera.
-
-    Raises
-    ------
-    InputError
-        No such row, or one that is no rigid motion.
-    """
-    try:
-        rows = dict(line.split(':', 1) for line in path.read_text().splitlines() if ':' in line)
-        values = np.array(rows['Tr'].split(), np.float64).reshape(3, 4)
-    except (OSError, KeyError, ValueError) as error:
-        raise InputError(f'{path}: no row Tr of 12 numbers, which the poses need: '
-                         f'{error}') from error
-    T = se3.compose(values[:, :3], values[:, 3])
-    check_rigid(path, T[None])
-    return T
 
 
 def check_rigid(path: Path, T: Array) -> None:

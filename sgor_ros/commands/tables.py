@@ -1,0 +1,226 @@
+"""`sgor_tables`: the tables and studies of the paper, on your data or in the built-in world."""
+from argparse import ArgumentParser
+from argparse import Namespace
+from collections.abc import Callable
+from collections.abc import Sequence
+from functools import partial
+from importlib import import_module
+from pathlib import Path
+import sys
+
+from ..core.common.settings import InputError
+from ..core.config import SgorConfig
+from ..core.warmup import warm_up
+from ..evaluation import pairs as pairing
+from ..evaluation import run as on_scans
+from ..evaluation.ablation import PAPER_ROWS
+from ..evaluation.methods import Method
+from ..evaluation.methods import rivals
+from ..evaluation.methods import sgor
+from ..evaluation.protocols import page
+from ..evaluation.protocols import studies
+from ..evaluation.protocols.drives import posed
+from ..evaluation.protocols.drives import strided
+from ..evaluation.protocols.front_end import Features
+from ..evaluation.protocols.indoor import depth_frames
+from ..evaluation.protocols.indoor import threedmatch
+from ..evaluation.protocols.kitti import kitti_10m
+from ..evaluation.protocols.kitti import kitti_10m_list
+from ..evaluation.protocols.kitti import kitti_loops
+from ..evaluation.protocols.run import Entry
+from ..evaluation.protocols.run import run
+from ..evaluation.protocols.task import Protocol
+from ..evaluation.protocols.task import Task
+from ..evaluation.protocols.truth import refined
+from ..evaluation.rivals import Answer
+from ..io.datasets import Drive
+from ..io.datasets import Frame
+from ..io.datasets import open_drives
+from . import options
+
+SPEED_M_S = 8.0
+ABLATION = 'ablation'
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run a protocol; return 0, or 2 on unusable input."""
+    return options.run(_tables, _parser().parse_args(arguments))
+
+
+def _parser() -> ArgumentParser:
+    parser = options.parser(
+        'Run a protocol of the literature with every method on the same matches, and print its '
+        'table beside the published rows. Stopped, it goes on where it was when it is started '
+        'again with the same --output.')
+    add = parser.add_argument
+    add('protocol', choices=list(PROTOCOLS),
+        help='kitti-10m: the 555 pairs by their rule or --list; kitti-loops: lists of loops in '
+        'bands; 3dmatch: fragments and gt.log, 3DLoMatch likewise; depth: single depth maps; '
+        'strides: keyframes so many apart; poses: all pairs of posed scans up to a distance')
+    add('--data', type=Path, metavar='FOLDER',
+        help='with folders velodyne, labels and poses.txt up to two levels below, or the scenes '
+        'of 3DMatch; without it the built-in world')
+    add('--list', type=Path, nargs='+', metavar='FILE', default=(),
+        help='pairs with their truth: rows of "sequence i sequence j" and a 4x4 matrix')
+    add('--refine-truth', action='store_true',
+        help='refine the truth by ICP, kept in OUTPUT/truth.json')
+    add('--strides', type=int, nargs='+', metavar='N', default=(1, 2, 4))
+    add('--max-distance', type=float, metavar='M', default=30.0)
+    add('--scans', type=int, default=120, help='of the built-in world')
+    add('--limit', type=int, default=0, metavar='PAIRS', help='evenly spread; 0: all')
+    add('--methods', nargs='+', metavar='NAME', help='of the table; default: all that there are')
+    add('--method', action='append', default=[], metavar='MODULE:FUNCTION',
+        help='one of your own: takes Matches, returns a Solution')
+    add('--raw', action='store_true',
+        help='also what registers raw scans: SGOR with all of ours, and KISS-Matcher')
+    add('--study', choices=[*studies.STUDIES, ABLATION], default='',
+        help='repeat for different numbers of matches, categories or random labels; ablation: '
+        'rows 1 to 9 of the paper')
+    add('--values', type=float, nargs='+', help='of the study')
+    add('--features', type=Path, metavar='FOLDER',
+        help='NAME.npz for each scan with points (V, 3) and descriptors (V, D)')
+    add('--seed', type=int, default=0)
+    add('--processes', type=int, default=1)
+    add('--dask', default='', metavar='ADDRESS', help='of a scheduler, to run on its workers')
+    add('--output', type=Path, metavar='FOLDER', help='default: out/PROTOCOL')
+    return parser
+
+
+def _tables(arguments: Namespace) -> int:
+    output: Path = arguments.output or Path('out') / arguments.protocol
+    protocol = PROTOCOLS[arguments.protocol](arguments)
+    if not protocol.tasks:
+        raise InputError(f'no pair of {protocol.name} in {arguments.data or "the built-in world"}'
+                         + (f'; {protocol.missing} in the list, their scans are not there'
+                            if protocol.missing else ''))
+    protocol = _spread(protocol, arguments.limit)
+    if arguments.refine_truth:
+        protocol = _with(protocol, refined(protocol.tasks, output / 'truth.json'))
+    study = '' if arguments.study == ABLATION else arguments.study
+    entries = _entries(arguments, protocol)
+    _say(f'{protocol.name}: {len(protocol.tasks)} pairs, {len(entries)} methods; {output}')
+    warm_up(protocol.front_end)
+    features = None if arguments.features is None else Features(arguments.features)
+    records = run(protocol, entries, output, features=features,
+                  variants=studies.variants(study, arguments.values, arguments.seed),
+                  processes=arguments.processes, dask=arguments.dask)
+    print(page.write(output, records, protocol, entries, study, features))
+    return 0
+
+
+def _entries(arguments: Namespace, protocol: Protocol) -> list[Entry]:
+    own = protocol.front_end
+    if arguments.study == ABLATION:
+        rows = {row.method: row.changes for row in PAPER_ROWS}
+        return [Entry(name, sgor(own.replace(**changes)), own.replace(**changes))
+                for name, changes in rows.items()]
+    entries = [Entry('SGOR', sgor(own))]
+    entries += [Entry(name, method) for name, method in rivals(_say).items()]
+    if arguments.raw:
+        methods = [on_scans.sgor('SGOR, all of ours, from scans', _everything(protocol)),
+                   *on_scans.rivals(_say).values()]
+        entries += [Entry(method.name, on_scans=partial(_from_scans, method))
+                    for method in methods]
+    if arguments.methods:
+        known = {entry.name: entry for entry in entries}
+        wrong = [name for name in arguments.methods if name not in known]
+        if wrong:
+            raise InputError(f'--methods {wrong[0]}: not one of {", ".join(known)}')
+        entries = [known[name] for name in arguments.methods]
+    return entries + [Entry(name, _imported(name)) for name in arguments.method]
+
+
+def _everything(protocol: Protocol) -> SgorConfig:
+    return SgorConfig.indoor() if 'depth' in protocol.name or '3d' in protocol.name \
+        else SgorConfig()
+
+
+def _from_scans(method: on_scans.Method, task: Task) -> Answer:
+    return method.run(on_scans.Sample(task.source.read(), task.target.read(),
+                                      task.source.label_convention,
+                                      task.target.label_convention, 0))
+
+
+def _imported(name: str) -> Method:
+    module, _, function = name.partition(':')
+    sys.path.insert(0, '')
+    try:
+        found: Method = getattr(import_module(module), function)
+    except (ImportError, AttributeError, ValueError) as error:
+        raise InputError(f'--method {name}: expected MODULE:FUNCTION: {error}') from error
+    return found
+
+
+def _drives(arguments: Namespace) -> list[Drive]:
+    if arguments.data is not None:
+        drives = [d for d in open_drives(arguments.data) if d.T_world_sensor is not None]
+        if not drives:
+            raise InputError(f'--data {arguments.data}: no drive with poses.txt in it')
+        return drives
+    try:
+        from ..world import simulate
+    except ImportError as error:
+        raise InputError(f'the built-in world needs Open3D ({error}): pip install open3d'
+                         ) from error
+    _say(f'building the world, seed {arguments.seed}')
+    return [pairing.drive_of('world', (scan[1:] for scan in simulate(
+        arguments.scans, arguments.seed, speed=SPEED_M_S)))]
+
+
+def _kitti_10m(arguments: Namespace) -> Protocol:
+    if arguments.list:
+        return kitti_10m_list(arguments.list[0], _finder(arguments))
+    drives = _drives(arguments)
+    return kitti_10m(drives, [d.T_world_sensor[:, :3, 3] for d in drives
+                              if d.T_world_sensor is not None])
+
+
+def _kitti_loops(arguments: Namespace) -> Protocol:
+    if not arguments.list:
+        raise InputError('kitti-loops: name the lists by --list')
+    return kitti_loops(arguments.list, _finder(arguments))
+
+
+def _finder(arguments: Namespace) -> Callable[[int, int], Frame | None]:
+    """Return what finds scan i of a sequence: in a folder of its number."""
+    if arguments.data is None:
+        raise InputError('--list needs --data: the folder of the sequences')
+    drives = {d.name.rpartition('/')[2]: {frame.name.rpartition('/')[2]: frame
+                                          for frame in d.frames}
+              for d in open_drives(arguments.data)}
+    return lambda sequence, scan: drives.get(f'{sequence:02d}', {}).get(f'{scan:06d}')
+
+
+def _indoor(arguments: Namespace, *, depth: bool) -> Protocol:
+    if arguments.data is None:
+        raise InputError('3dmatch and depth have no built-in world: name a folder by --data')
+    return (depth_frames(arguments.data, arguments.strides[0]) if depth
+            else threedmatch(arguments.data))
+
+
+def _spread(protocol: Protocol, most: int) -> Protocol:
+    count = len(protocol.tasks)
+    if not 0 < most < count:
+        return protocol
+    return _with(protocol, [protocol.tasks[i * count // most] for i in range(most)])
+
+
+def _with(protocol: Protocol, tasks: Sequence[Task]) -> Protocol:
+    return Protocol(protocol.name, tasks, protocol.thresholds, protocol.inlier_m,
+                    protocol.front_end, protocol.missing)
+
+
+def _say(message: str) -> None:
+    print(message, file=sys.stderr, flush=True)
+
+
+PROTOCOLS: dict[str, Callable[[Namespace], Protocol]] = {
+    'kitti-10m': _kitti_10m,
+    'kitti-loops': _kitti_loops,
+    '3dmatch': partial(_indoor, depth=False),
+    'depth': partial(_indoor, depth=True),
+    'strides': lambda arguments: strided(_drives(arguments), arguments.strides),
+    'poses': lambda arguments: posed(_drives(arguments), arguments.max_distance)}
+
+if __name__ == '__main__':
+    sys.exit(main())
