@@ -114,7 +114,7 @@ def test_rows_of_whole_and_broken_words(n):
 
 
 @pytest.mark.parametrize('cutoff', CUTOFFS)
-@pytest.mark.parametrize('groups', [63, 64, 65, 200])
+@pytest.mark.parametrize('groups', [63, 64, 65, 200, 258])
 def test_more_keys_than_a_word_has_bits(groups, cutoff):
     """Keys are worked on in blocks of 64, divided where they stand: each has its own row."""
     matches, _ = random_matches(260, 0.3, groups)

@@ -19,6 +19,7 @@ from .seed_rows import BLOCK
 from .seed_rows import Block
 from .seed_rows import blocks_of
 from .seed_rows import choose
+from .seed_rows import far_rows
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,13 +70,14 @@ def filter_groups(correspondences: Correspondences, graph: ConsistencyGraph, gro
                               np.zeros((count, keep), np.float32))
     agreement = label_agreement(correspondences, semantics)
     support = np.empty((BLOCK, -(-n // 64) * 64), np.float32)
+    far = far_rows(correspondences, graph, count)
     for places in blocks_of(correspondences.source[groups.keys], np.arange(count)):
         near, wanted = np.zeros((2, n), np.uint64)
         keys = groups.keys[places]
         visits = _mark_keys(graph.start, graph.index, correspondences.source, keys,
                             groups.squared_reach[places], *agreement, near, wanted)
         block = Block(near, wanted, np.flatnonzero(wanted), visits)
-        add_support(correspondences, graph, block, keys, support)
+        add_support(correspondences, graph, far, block, keys, support)
         choose(graph, block, support, places, filtered.kept, filtered.scores)
     return filtered
 

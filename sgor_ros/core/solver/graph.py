@@ -42,10 +42,10 @@ _ONE = U64(1)
 
 
 @dataclass(frozen=True, eq=False)
-class ConsistencyGraph:
-    """Pairs of correspondences with d_ij <= sigma_d (M', Eq. 6), as compressed rows.
+class Rows:
+    """Pairs of correspondences as compressed rows of a symmetric matrix.
 
-    Row i is ``index[start[i]:start[i + 1]]``, i itself in it; the matrix is symmetric.
+    Row i is ``index[start[i]:start[i + 1]]``, i itself in it.
 
     Attributes
     ----------
@@ -53,22 +53,32 @@ class ConsistencyGraph:
     index : (E,) uint16, or uint32 from 65,537 correspondences on
     weight : (E,) float32
         W_m of each pair (Eq. 8).
+    """
+
+    start: NDArray[np.uint64]
+    index: NDArray[np.uint16] | NDArray[np.uint32]
+    weight: NDArray[np.float32]
+
+
+@dataclass(frozen=True, eq=False)
+class ConsistencyGraph(Rows):
+    """Pairs of correspondences with d_ij <= sigma_d (M', Eq. 6).
+
+    Attributes
+    ----------
     sigma_d : float
         Metres.
     reach : float
         d_ij up to which W_m is not zero, metres; beyond sigma_d it is not kept here.
     """
 
-    start: NDArray[np.uint64]
-    index: NDArray[np.uint16] | NDArray[np.uint32]
-    weight: NDArray[np.float32]
     sigma_d: float
     reach: float
 
 
 @dataclass(frozen=True, eq=False)
 class _Band:
-    """The consistent pairs i <= j of the rows from `first` on, `length` of each, in order."""
+    """The pairs i <= j of the rows from `first` on, `length` of each, in order."""
 
     first: int
     length: NDArray[np.uint64]
@@ -82,13 +92,22 @@ def consistency_graph(correspondences: Correspondences, config: SgorConfig) -> C
     Where more than `MOST_EDGES` are consistent, only some of the correspondences, evenly spread,
     have edges.
     """
+    sigma_d = config.sigma_d
+    rows = pairs_within(correspondences, sigma_d, sigma_d)
+    return ConsistencyGraph(rows.start, rows.index, rows.weight, sigma_d,
+                            sigma_d * config.weight_cutoff)
+
+
+def pairs_within(correspondences: Correspondences, sigma_d: float, reach: float) -> Rows:
+    """Return the rows of all pairs with d_ij up to `reach`, and their W_m."""
     p, q = correspondences.source, correspondences.target
     n = nodes = len(p)
     if n > SAMPLE:
         some = thin(n, SAMPLE)
-        nodes = _affordable(n, _edges(*_upper(p[some], q[some], SAMPLE, config)) * (n / SAMPLE)**2)
+        share = _edges(*_upper(p[some], q[some], SAMPLE, sigma_d, reach)) / SAMPLE**2
+        nodes = _affordable(n, share * n**2)
     while True:
-        bands, below = _upper(p, q, nodes, config)
+        bands, below = _upper(p, q, nodes, sigma_d, reach)
         edges = _edges(bands, below)
         if edges <= MOST_EDGES:
             break
@@ -107,8 +126,7 @@ def consistency_graph(correspondences: Correspondences, config: SgorConfig) -> C
             _fill(band.first, band.length, band.index, band.weight, middle, own, index, weight)
 
     shared(fill, len(bands))
-    return ConsistencyGraph(start, index, weight, config.sigma_d,
-                            config.sigma_d * config.weight_cutoff)
+    return Rows(start, index, weight)
 
 
 def _affordable(nodes: int, edges: float) -> int:
@@ -120,9 +138,9 @@ def _edges(bands: list[_Band], below: NDArray[np.uint32]) -> int:
     return sum(len(band.index) for band in bands) + int(below.sum(dtype=np.uint64))
 
 
-def _upper(p: NDArray[np.float64], q: NDArray[np.float64], nodes: int, config: SgorConfig
-           ) -> tuple[list[_Band], NDArray[np.uint32]]:
-    """Find the consistent pairs i <= j among some of (N, 3) matches, evenly spread.
+def _upper(p: NDArray[np.float64], q: NDArray[np.float64], nodes: int, sigma_d: float,
+           reach: float) -> tuple[list[_Band], NDArray[np.uint32]]:
+    """Find the pairs i <= j up to a reach among some of (N, 3) matches, evenly spread.
 
     Returns
     -------
@@ -138,7 +156,7 @@ def _upper(p: NDArray[np.float64], q: NDArray[np.float64], nodes: int, config: S
         others[thin(n, nodes)] = False
         columns[:, :n][:, others] = np.nan
     both = np.hstack((p, q))
-    limit = prefilter_limit(config.sigma_d)
+    limit = prefilter_limit(reach)
     count = min(max(n * n // BAND_PAIRS // 2, FEWEST_BANDS), MOST_BANDS)
     # rows get shorter, so bands get wider, to cost the same
     rows = np.rint(n - n * np.sqrt(1 - np.arange(count + 1) / count)).astype(np.int64)
@@ -152,7 +170,7 @@ def _upper(p: NDArray[np.float64], q: NDArray[np.float64], nodes: int, config: S
             candidates = _mark(rows[b], columns, limit, bits)
             index = np.empty(candidates, np.uint16 if n <= 2**16 else np.uint32)
             weight = np.empty(candidates, np.float32)
-            found = _keep(rows[b], both, bits, config.sigma_d, length, below[b], index, weight)
+            found = _keep(rows[b], both, bits, sigma_d, reach, length, below[b], index, weight)
             bands[b] = _Band(rows[b], length, index[:found], weight[:found])
 
     shared(find, count)
@@ -254,8 +272,9 @@ def weigh(both, places, count, px, py, pz, qx, qy, qz, sigma_d,  # type: ignore[
 
 
 @numba.njit(cache=True, nogil=True)
-def _keep(first, both, bits, sigma_d, length, below, index, weight):  # type: ignore[no-untyped-def]
-    """Write the consistent ones of the candidates, row after row; return how many."""
+def _keep(first, both, bits, sigma_d, reach, length, below, index,  # type: ignore[no-untyped-def]
+          weight):
+    """Write those of the candidates that are within reach, row after row; return how many."""
     n = len(both)
     places = np.empty(n, np.uint32)
     squared, other, near_weight = np.empty(n), np.empty(n), np.empty(n, np.float32)
@@ -264,17 +283,17 @@ def _keep(first, both, bits, sigma_d, length, below, index, weight):  # type: ig
         i = first + r
         near = places_of_bits(bits[r], i // 64, places)
         px, py, pz, qx, qy, qz = both[i]
-        weigh(both, places, near, px, py, pz, qx, qy, qz, sigma_d, sigma_d, squared, other,
+        weigh(both, places, near, px, py, pz, qx, qy, qz, sigma_d, reach, squared, other,
               near_weight)
         begin = at
         for k in range(near):
-            # written anyhow, and kept where consistent: no branch to mispredict
+            # written anyhow, and kept where within: no branch to mispredict
             j = places[k]
             index[at] = j
             weight[at] = near_weight[k]
-            consistent = U64(squared[k] <= sigma_d * sigma_d)
-            at += consistent
-            below[j] += consistent
+            within = U64(squared[k] <= reach * reach)
+            at += within
+            below[j] += within
         length[r] = at - begin
         if length[r]:
             below[i] -= _ONE    # itself

@@ -21,8 +21,10 @@ from ..matching.correspondences import Correspondences
 from .graph import ConsistencyGraph
 from .graph import lanes_of
 from .graph import mark_row
+from .graph import pairs_within
 from .graph import places_of_bits
 from .graph import prefilter_limit
+from .graph import Rows
 from .graph import U64
 from .graph import weigh
 
@@ -30,6 +32,8 @@ BLOCK = 64
 """Keys of which each has a bit of a word, and a lane of four vectors."""
 SPARSE = 3
 """Single additions that take as long as one to 64 lanes."""
+FEW_BLOCKS, MOST_MATCHES = 4, 12_000
+"""With more blocks W_m beyond sigma_d is weighed once; of more matches it would be too large."""
 
 
 class Block(NamedTuple):
@@ -65,25 +69,35 @@ def blocks_of(points: NDArray[np.float64], keys: NDArray[np.intp]) -> Iterator[N
     yield from blocks_of(points, order[half:])
 
 
-def add_support(correspondences: Correspondences, graph: ConsistencyGraph, block: Block,
-                keys: NDArray[np.uint32], support: NDArray[np.float32]) -> None:
-    """Write m_l^T W_m for the keys of a block, (64, N), at least where they ask for it."""
-    near, wanted = block.near, block.wanted
-    tasks = support.shape[1] // 16
+def far_rows(correspondences: Correspondences, graph: ConsistencyGraph, keys: int) -> Rows | None:
+    """Return W_m, where it has rows to add up: of the graph, or of all pairs within its reach.
+
+    None where it costs less, or less memory, to weigh anew what is near a key for each block.
+    """
     if graph.reach <= graph.sigma_d:
-        if block.visits < SPARSE * len(graph.index):
-            shared(_scatter, len(keys), graph.start, graph.index, graph.weight, keys, support)
-            return
-        shared(_support, tasks, graph.start, graph.index, graph.weight,
-               near.view(np.uint16), support)
-        return
-    # W_m reaches beyond the graph: what is near a key is weighed anew
-    p, q = correspondences.source, correspondences.target
-    both = np.hstack((p - p.mean(axis=0), q - q.mean(axis=0)))
-    some = np.flatnonzero(near)
-    shared(_support_afar, tasks, graph.start, graph.index, both, both[some],
-           lanes_of(both[some, :3], both[some, 3:]), prefilter_limit(graph.reach), graph.sigma_d,
-           graph.reach, near[some], wanted, support)
+        return graph
+    if keys <= FEW_BLOCKS * BLOCK or len(correspondences) > MOST_MATCHES:
+        return None
+    return pairs_within(correspondences, graph.sigma_d, graph.reach)
+
+
+def add_support(correspondences: Correspondences, graph: ConsistencyGraph, far: Rows | None,
+                block: Block, keys: NDArray[np.uint32], support: NDArray[np.float32]) -> None:
+    """Write m_l^T W_m for the keys of a block, (64, N), at least where they ask for it."""
+    near = block.near
+    tasks = support.shape[1] // 16
+    if far is None:
+        p, q = correspondences.source, correspondences.target
+        both = np.hstack((p - p.mean(axis=0), q - q.mean(axis=0)))
+        some = np.flatnonzero(near)
+        shared(_support_afar, tasks, graph.start, graph.index, both, both[some],
+               lanes_of(both[some, :3], both[some, 3:]), prefilter_limit(graph.reach),
+               graph.sigma_d, graph.reach, near[some], block.wanted, support)
+    elif block.visits < SPARSE * len(graph.index):
+        shared(_scatter, len(keys), graph.start, graph.index, far.start, far.index,
+               far.weight, keys, support)
+    else:
+        shared(_support, tasks, far.start, far.index, far.weight, near.view(np.uint16), support)
 
 
 def choose(graph: ConsistencyGraph, block: Block, support: NDArray[np.float32],
@@ -105,15 +119,16 @@ def _asking(start, index, wanted, b):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)
-def _scatter(first, last, start, index, weight, keys, support):  # type: ignore[no-untyped-def]
+def _scatter(first, last, start, index, far_start, far_index, weight,  # type: ignore[no-untyped-def]
+             keys, support):
     """Write the support of each key from the rows that are near it: faster where keys have few."""
     for g in range(U64(first), U64(last)):
         own = support[g]
         own[:] = 0
         for k in range(start[keys[g]], start[keys[g] + U64(1)]):
             a = U64(index[k])
-            for e in range(start[a], start[a + U64(1)]):
-                own[index[e]] += weight[e]
+            for e in range(far_start[a], far_start[a + U64(1)]):
+                own[far_index[e]] += weight[e]
 
 
 @numba.njit(cache=True, nogil=True)
