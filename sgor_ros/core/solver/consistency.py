@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from ..matching.correspondences import Correspondences
 from ..scan.labels import labels_agree
 from .graph import ConsistencyGraph
-from .graph import U64
 from .grouping import Groups
 from .grouping import squared_distance
+from .lengths import U64
 from .seed_rows import add_support
 from .seed_rows import BLOCK
 from .seed_rows import Block

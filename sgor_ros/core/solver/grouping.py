@@ -9,7 +9,7 @@ from ..common.threads import shared
 from ..config import SgorConfig
 from ..matching.correspondences import Correspondences
 from .graph import ConsistencyGraph
-from .graph import U64
+from .lengths import U64
 
 POWER_ITERATIONS = 10
 """As PointDSC; the order of the keys has settled by then."""

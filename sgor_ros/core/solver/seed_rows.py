@@ -19,14 +19,14 @@ from ..common.lanes import total
 from ..common.threads import shared
 from ..matching.correspondences import Correspondences
 from .graph import ConsistencyGraph
-from .graph import lanes_of
-from .graph import mark_row
 from .graph import pairs_within
-from .graph import places_of_bits
-from .graph import prefilter_limit
 from .graph import Rows
-from .graph import U64
-from .graph import weigh
+from .lengths import lanes_of
+from .lengths import mark_row
+from .lengths import places_of_bits
+from .lengths import prefilter_limit
+from .lengths import U64
+from .lengths import weigh
 
 BLOCK = 64
 """Keys of which each has a bit of a word, and a lane of four vectors."""
