@@ -17,6 +17,7 @@ COMMANDS = {
     'sgor_kitti_to_bag': 'sgor_ros.commands.kitti_to_bag',
     'sgor_benchmark': 'sgor_ros.commands.benchmark',
     'sgor_demo': 'sgor_ros.commands.demo',
+    'sgor_warm_up': 'sgor_ros.commands.warm_up',
     'sgor_tables': 'sgor_ros.commands.tables',
 }
 # the built-in world; the module of open3d without CUDA

@@ -86,4 +86,5 @@ if [ "${#pins[@]}" -eq 0 ]; then
         say 'it could not be built (cmake and a C++ compiler?): the tests of /tf are skipped'
 fi
 "$venv/bin/python" -c 'import open3d, rclpy, sgor_ros, small_gicp'
+"$venv/bin/python" -m sgor_ros.commands.warm_up
 say "ready: $venv/bin/python"

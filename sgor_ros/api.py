@@ -8,6 +8,7 @@ from .core.result import Registration
 from .core.scan.preprocessing import preprocess
 from .core.scan.scan import PreparedScan
 from .core.scan.scan import SemanticScan
+from .core.warmup import warm_up
 from .tracker import State
 from .tracker import TrackedScan
 from .tracker import Tracker
@@ -15,4 +16,4 @@ from .tracker import TrackerConfig
 
 __all__ = ['InputError', 'Placement', 'PreparedScan', 'Registration', 'SemanticScan', 'SgorConfig',
            'State', 'TrackedScan', 'Tracker', 'TrackerConfig', 'preprocess', 'register',
-           'register_correspondences']
+           'register_correspondences', 'warm_up']

@@ -1,21 +1,31 @@
 """Where compiled code is kept: numba reads it as it is loaded, so it is decided without numba.
 
-Numba keeps compiled code beside the source or in the user's cache, and gives up where neither can
-be written, as in a container of which only /tmp can be.
+Numba keeps compiled code beside the source or, where that cannot be written, in the user's cache,
+and gives up where neither can, as in a container of which only /tmp can be. It does not look
+beside the source for what it may only read: whoever uses a package that somebody else installed
+and compiled would compile everything again.
 """
+from contextlib import suppress
 import os
 from pathlib import Path
 import tempfile
 
 VARIABLE = 'NUMBA_CACHE_DIR'
+PACKAGE = Path(__file__).parent
 
 
 def choose_cache_folder() -> None:
-    """Name a folder in the environment where none is named and numba would find none."""
-    usual = (Path(__file__).parent,
-             Path(os.environ.get('XDG_CACHE_HOME') or os.path.expanduser('~/.cache')))
-    if not os.environ.get(VARIABLE) and not any(map(_writable, usual)):
-        os.environ[VARIABLE] = str(_private_folder())
+    """Find compiled code that came with the package; name a folder where numba has none."""
+    if os.environ.get(VARIABLE) or _writable(PACKAGE):
+        return
+    user = Path(os.environ.get('XDG_CACHE_HOME') or os.path.expanduser('~/.cache'))
+    if _writable(user):
+        folder = user / 'numba'    # numba's own choice
+    else:
+        folder = _private_folder()
+        os.environ[VARIABLE] = str(folder)
+    with suppress(OSError):    # a full disk, for one: then it is compiled
+        _copy_installed(folder)
 
 
 def _writable(folder: Path) -> bool:
@@ -31,3 +41,29 @@ def _private_folder() -> Path:
     found = folder.lstat()
     mine = found.st_uid == os.getuid() and found.st_mode & 0o777 == 0o700
     return folder if mine else Path(tempfile.mkdtemp())
+
+
+def _copy_installed(folder: Path) -> None:
+    """Copy what was compiled beside the source into a cache of numba, unless it has newer."""
+    from hashlib import sha1
+    from shutil import copyfile
+
+    # the index last: it names the others
+    for path in (*PACKAGE.rglob('*.nbc'), *PACKAGE.rglob('*.nbi')):
+        if not (_trusted(path) and _trusted(path.parent)):
+            continue
+        source = path.parents[1]
+        home = folder / f'{source.name}_{sha1(str(source).encode()).hexdigest()}'
+        copy = home / path.name
+        if copy.exists() and copy.stat().st_mtime >= path.stat().st_mtime:
+            continue
+        home.mkdir(parents=True, exist_ok=True)
+        part = home / f'{path.name}.{os.getpid()}'
+        copyfile(path, part)
+        part.replace(copy)
+
+
+def _trusted(path: Path) -> bool:
+    """Return whether nobody but the owner of the package, whose code we run, could write this."""
+    found = path.lstat()
+    return found.st_uid in (0, PACKAGE.stat().st_uid) and not found.st_mode & 0o022

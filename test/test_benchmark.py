@@ -387,13 +387,27 @@ def test_solver_command(sequences_folder, tmp_path):
     (['pairs', '--data', '{data}', '--methods', 'icp'], '--methods icp: not one of sgor, paper'),
     (['pairs', '--data', '{data}', '--max-distance', '0.1'], 'no pairs within 0.1 m'),
     (['wrong', '--data', '{data}/sequences/01'], 'no wrong pairs'),
+    (['solver', '--data', 'nope'], 'nope: no such file or folder'),
+    (['solver', '--output', '{data}'], 'exists already'),
 ])
-def test_unusable_input_is_told_in_one_line(arguments, message, sequences_folder, capsys):
+def test_unusable_input_is_told_in_one_line(arguments, message, sequences_folder, capsys,
+                                            tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     code = main([argument.format(data=sequences_folder) for argument in arguments])
     assert code == 2
     error = capsys.readouterr().err.strip().splitlines()[-1]
     assert error.startswith('error: ')
     assert message in error
+    assert not list(tmp_path.glob('out/benchmark/*'))
+
+
+def test_a_second_run_has_a_folder_of_its_own(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    for name in ('solver', 'solver_2'):
+        assert main(['solver', '--counts', '400', '--runs', '1', '--dense-limit', '0']) == 0
+        assert f'wrote out/benchmark/{name}' in capsys.readouterr().err
+        assert {path.name for path in (tmp_path / 'out/benchmark' / name).iterdir()} == {
+            'table.md', 'rows.csv', 'run.json', 'plot.png'}
 
 
 @pytest.mark.parametrize(('break_it', 'message'), [

@@ -122,6 +122,7 @@ def test_broken_sequences(sequence, tmp_path, capsys, what):
     message = capsys.readouterr().err
     assert message.startswith('error: ')
     assert says in message
+    assert not (tmp_path / 'bag').exists()
 
 
 EYE = '1 0 0 0 0 1 0 0 0 0 1 0'

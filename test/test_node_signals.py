@@ -87,9 +87,9 @@ def test_while_it_compiles(domain, tmp_path, monkeypatch):
             while 'compiling' not in node.log.read_text():
                 assert node.alive(), node.log.read_text()
                 time.sleep(0.05)
-            time.sleep(10.0 * share)
+            time.sleep(5.0 * share)
             assert 'ready' not in node.log.read_text()
-            assert_clean(node, end(node, signals), f'compiling, {10 * share:.2f} s')
+            assert_clean(node, end(node, signals), f'compiling, {5 * share:.2f} s')
 
 
 def test_while_it_is_idle(domain, tmp_path):

@@ -1,5 +1,7 @@
 """`sgor_register` as a user runs it."""
 import json
+import re
+import time
 
 from conftest import errors
 from conftest import relative
@@ -7,6 +9,7 @@ import numpy as np
 import pytest
 
 from sgor_ros import SgorConfig
+from sgor_ros.commands import register as register_command
 from sgor_ros.commands.register import main
 
 
@@ -37,6 +40,19 @@ def test_result_on_screen_in_json_and_as_picture(pair, tmp_path, capsys):
     assert (tmp_path / 'r.png').read_bytes().startswith(b'\x89PNG')
 
 
+def test_the_time_is_that_of_the_whole_work(pair, tmp_path, capsys):
+    begin = time.perf_counter()
+    assert main([*pair[:2], '--json', str(tmp_path / 'r.json')]) == 0
+    whole = time.perf_counter() - begin
+    timings = json.loads((tmp_path / 'r.json').read_text())['timings_s']
+    # two clouds of 40,000 points: no machine does that in less
+    assert 2e-3 < timings['preprocessing'] < sum(timings.values()) < whole
+    taken, of_them = re.search(r'took (\d+) ms, (\d+) of them to preprocess',
+                               capsys.readouterr().out).groups()
+    assert int(taken) == round(1e3 * sum(timings.values()))
+    assert int(of_them) == round(1e3 * timings['preprocessing'])
+
+
 def test_failure_is_exit_code_1_with_the_reason(pair, tmp_path, capsys):
     rng = np.random.default_rng(0)
     np.savez(tmp_path / 'noise.npz', points=rng.uniform(-30, 30, (20000, 3)))
@@ -59,11 +75,12 @@ def test_options_reach_the_registration(pair, tmp_path, capsys):
     assert main([source, target, '--min-inliers', '10000']) == 1
     assert 'min_inliers is 10000' in capsys.readouterr().out
     params = tmp_path / 'params.yaml'
-    params.write_text('/**:\n  ros__parameters:\n    min_inliers: 9999\n    nonsense: 1\n')
+    params.write_text('/**:\n  ros__parameters:\n    min_inliers: 9999\n    nonsense: 1\n'
+                      '    7: 1\n')
     assert main([source, target, '--params-file', str(params)]) == 1
     said = capsys.readouterr()
     assert 'min_inliers is 9999' in said.out
-    assert 'ignored: nonsense' in said.err
+    assert 'ignored: 7, nonsense' in said.err
 
 
 @pytest.mark.parametrize(('options', 'says'), [
@@ -80,7 +97,32 @@ def test_bad_options(pair, capsys, options, says):
     assert says in message
 
 
-@pytest.mark.parametrize('content', ['- a list', 'a: 1', '/**: {ros__parameters: 3}', '{'])
+@pytest.mark.parametrize(('options', 'says'), [
+    (['--plot', '{0}/pair.xyz'], 'pair.xyz: expected a name ending in .png, .pdf, .svg'),
+    (['--plot', '{0}/nowhere/pair.png'], 'no folder {0}/nowhere'),
+    (['--json', '{0}/nowhere/r.json'], 'no folder {0}/nowhere'),
+    (['--json', '{0}'], 'is a folder'),
+    (['--json', '{source}'], 'would replace an input'),
+    (['--json', '{0}/a.png', '--plot', '{0}/a.png'], 'the same file as --json'),
+])
+def test_outputs_are_checked_before_the_work(pair, tmp_path, capsys, options, says, monkeypatch):
+    monkeypatch.setattr(register_command, 'register', None)    # or it would be called
+    options = [option.format(tmp_path, source=pair[0]) for option in options]
+    assert main([*pair[:2], *options]) == 2
+    said = capsys.readouterr()
+    assert says.format(tmp_path) in said.err
+    assert said.out == ''
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize('ending', ['pdf', 'svg'])
+def test_pictures_of_other_kinds(pair, tmp_path, ending):
+    assert main([*pair[:2], '--plot', str(tmp_path / f'r.{ending}')]) == 0
+    assert (tmp_path / f'r.{ending}').read_bytes()[:5] in (b'%PDF-', b'<?xml')
+
+
+@pytest.mark.parametrize('content', ['- a list', 'a: 1', '/**: {ros__parameters: 3}', '{',
+                                     'a: 2020-13-45', '[' * 9999])
 def test_bad_params_files(pair, tmp_path, capsys, content):
     params = tmp_path / 'params.yaml'
     params.write_text(content)

@@ -100,17 +100,45 @@ def test_results_in_a_bag(replayed):
         False, True, True, True]    # the first scan has nothing to compare with
 
 
-def test_existing_results_in_a_bag_are_kept(street_bag, replayed, capsys):
-    assert main([str(street_bag), '--output', str(replayed), '--bag']) == 2
-    assert 'exists already' in capsys.readouterr().err
+def test_existing_folders_are_refused(street_bag, replayed, capsys):
+    before = {path: path.stat().st_mtime_ns for path in replayed.rglob('*')}
+    for folder in (replayed, street_bag):
+        assert main([str(street_bag), '--output', str(folder)]) == 2
+        assert f'{folder}: exists already' in capsys.readouterr().err
+    assert {path: path.stat().st_mtime_ns for path in replayed.rglob('*')} == before
+
+
+def test_results_of_their_own_beside_the_bag(street_bag, tmp_path, monkeypatch, capsys):
+    """As README has it: a bag in out/, and a second replay of it."""
+    shutil.copytree(street_bag, tmp_path / 'out/08')
+    monkeypatch.chdir(tmp_path)
+    for name in ('08_replay', '08_replay_2'):
+        assert main(['out/08']) == 0
+        assert f'wrote out/{name}: summary.json, trajectory.png' in capsys.readouterr().out
+        assert summary(tmp_path / 'out' / name)['successes'] == 4
+    assert {path.name for path in (tmp_path / 'out').iterdir()} == {
+        '08', '08_replay', '08_replay_2'}
+    assert len(list((tmp_path / 'out/08').iterdir())) == 2
+
+
+def test_presets_and_a_run_in_which_nothing_is_registered(street_bag, tmp_path, capsys):
+    assert main([str(street_bag), '--output', str(tmp_path / 'a'), '--preset', 'paper',
+                 '--sigma-g', '0.2']) == 0
+    parameters = summary(tmp_path / 'a')['parameters']
+    assert parameters['local_refinement'] is SgorConfig.paper().local_refinement is False
+    assert parameters['sigma_g'] == 0.2
+    assert main([str(street_bag), '--output', str(tmp_path / 'b'), '--min-inliers',
+                 '10000']) == 1
+    assert 'no scan could be registered to another' in capsys.readouterr().err
+    assert summary(tmp_path / 'b')['scans'] == 4
 
 
 def test_settings_by_option_and_by_file(street_bag, tmp_path):
     params = tmp_path / 'p.yaml'
     params.write_text('/**:\n  ros__parameters:\n    mode: consecutive\n    sigma_d: 0.5\n')
-    assert main([str(street_bag), '--output', str(tmp_path), '--params-file', str(params),
+    assert main([str(street_bag), '--output', str(tmp_path / 'out'), '--params-file', str(params),
                  '--sigma-d', '0.7', '--odom-frame', 'map']) == 0
-    parameters = summary(tmp_path)['parameters']
+    parameters = summary(tmp_path / 'out')['parameters']
     assert (parameters['mode'], parameters['sigma_d'], parameters['odom_frame']) == (
         'consecutive', 0.7, 'map')
 
@@ -145,17 +173,17 @@ def test_broken_clouds_are_left_out(street, tmp_path, capsys):
         (0, cdr(cloud_of(street, 0, 0))), (1, cdr(short)), (2, cdr(empty)), (3, cdr(nan)),
         (4 * PERIOD_NS, cdr(cloud_of(street, 1, 4 * PERIOD_NS))[:300]),
         (5 * PERIOD_NS, cdr(cloud_of(street, 1, 5 * PERIOD_NS)))])
-    assert main([str(bag), '--output', str(tmp_path)]) == 0
-    result = summary(tmp_path)
+    assert main([str(bag), '--output', str(tmp_path / 'out')]) == 0
+    result = summary(tmp_path / 'out')
     assert [failure['scan'] for failure in result['failures']] == [1, 2, 3, 4]
     said = capsys.readouterr().err
     for text in ('data: 1000 bytes', 'the cloud is empty', 'none of 5 is finite',
                  'cannot be read'):
         assert text in said
-    poses = read_kitti(tmp_path / 'trajectory_kitti.txt')
+    poses = read_kitti(tmp_path / 'out/trajectory_kitti.txt')
     assert np.isnan(poses[1:5, :3]).all(), 'one row a scan, so that rows and scans stay in step'
     assert errors(poses[5], relative(street[0][2], street[1][2]))[0] < 0.1
-    assert len(np.loadtxt(tmp_path / 'trajectory.tum')) == 2
+    assert len(np.loadtxt(tmp_path / 'out/trajectory.tum')) == 2
 
 
 def test_time_that_runs_backwards_starts_anew(street, tmp_path, capsys):
@@ -164,38 +192,38 @@ def test_time_that_runs_backwards_starts_anew(street, tmp_path, capsys):
     with BagReader(bag) as reader:
         raw = [cdr(cloud.read()[2]) for cloud in reader.clouds('/points')]
     again = write_raw(tmp_path / 'again', list(enumerate([*raw, *raw])))
-    assert main([str(again), '--output', str(tmp_path)]) == 0
+    assert main([str(again), '--output', str(tmp_path / 'out')]) == 0
     # the first that falls back may be late, the second confirms the jump
-    assert summary(tmp_path)['restarts'] == [0, 4]
+    assert summary(tmp_path / 'out')['restarts'] == [0, 4]
     assert 'time ran backwards' in capsys.readouterr().err
-    np.testing.assert_array_equal(read_kitti(tmp_path / 'trajectory_kitti.txt')[4], np.eye(4))
+    np.testing.assert_array_equal(read_kitti(tmp_path / 'out/trajectory_kitti.txt')[4], np.eye(4))
 
 
 def test_missing_label_field_tells_the_fields(street, tmp_path, capsys):
     bag = write_bag(tmp_path / 'bag', [(street[0][0], None, 0), (street[1][0], None, PERIOD_NS)])
-    assert main([str(bag), '--output', str(tmp_path), '--label-field', 'label']) == 2
+    assert main([str(bag), '--output', str(tmp_path / 'out'), '--label-field', 'label']) == 2
     assert 'none of 2 clouds could be used: field label: the cloud has none; its fields are ' \
         'x, y, z' in capsys.readouterr().err
-    assert main([str(bag), '--output', str(tmp_path), '--label-field', 'x']) == 2
+    assert main([str(bag), '--output', str(tmp_path / 'out'), '--label-field', 'x']) == 2
     assert 'field x: it holds coordinates' in capsys.readouterr().err
     for field, told in (('auto', 1), ('none', 0)):
-        assert main([str(bag), '--output', str(tmp_path), '--label-field', field]) == 0
-        assert summary(tmp_path)['successes'] == 2
+        assert main([str(bag), '--output', str(tmp_path / field), '--label-field', field]) == 0
+        assert summary(tmp_path / field)['successes'] == 2
         assert capsys.readouterr().err.count('works without labels') == told
 
 
 def test_the_track_of_a_base(street, street_bag, tmp_path, capsys):
     """As the node publishes it: the base begins at the origin, whatever the sensor sees."""
     mount = '1.2 -0.3 1.8 0.05 0.1 1.5'
-    options = ['--output', str(tmp_path), '--base-frame', 'base_link']
+    options = ['--output', str(tmp_path / 'out'), '--base-frame', 'base_link']
     assert main([str(street_bag), *options]) == 2
     assert 'it needs T_base_sensor' in capsys.readouterr().err
     assert main([str(street_bag), *options, '--bag', '--T-base-sensor', mount]) == 0
     T_sensor_base = np.linalg.inv(parse_transform(mount, 'mount'))
     bases = [pose @ T_sensor_base for *_, pose in street]
-    for found, base in zip(read_kitti(tmp_path / 'trajectory_kitti.txt'), bases, strict=True):
+    for found, base in zip(read_kitti(tmp_path / 'out/trajectory_kitti.txt'), bases, strict=True):
         assert errors(found, relative(bases[0], base))[0] < 0.15
-    with AnyReader([tmp_path / 'bag']) as reader:
+    with AnyReader([tmp_path / 'out/bag']) as reader:
         found = [(connection.topic, reader.deserialize(raw, connection.msgtype))
                  for connection, _, raw in reader.messages()]
     odometry = [message for topic, message in found if topic == '/odometry']
@@ -216,8 +244,8 @@ def two_topics(street, tmp_path):
 
 
 def test_the_labelled_topic_is_found(two_topics, tmp_path):
-    assert main([str(two_topics), '--output', str(tmp_path)]) == 0
-    assert summary(tmp_path)['topic'] == '/labelled'
+    assert main([str(two_topics), '--output', str(tmp_path / 'out')]) == 0
+    assert summary(tmp_path / 'out')['topic'] == '/labelled'
 
 
 @pytest.mark.parametrize(('options', 'says'), [
@@ -280,24 +308,29 @@ def test_corrupt_bags(street_bag, tmp_path, capsys, kind):
     said = capsys.readouterr().err
     assert said.startswith(f'error: {path}: ')
     assert 'Traceback' not in said
+    assert not (tmp_path / 'out').exists()
+    tools = {'text.bag': 'rosbag reindex', 'text.mcap': 'mcap recover'}
+    assert ('mends it' in said) is (kind in (
+        'text.mcap', 'text.db3', 'text.bag', 'metadata', 'truncated', 'empty', 'garbage'))
+    assert 'mends it' not in said or tools.get(kind, 'ros2 bag reindex') in said
 
 
 def test_a_bag_that_breaks_off_keeps_what_came_before(street, tmp_path, capsys):
     bag = write_raw(tmp_path / 'bag', [(i * PERIOD_NS, cdr(cloud_of(street, i, i * PERIOD_NS)))
                                        for i in (0, 1, 2, 3)])
     spoil_bytes(next(bag.glob('*.db3')), 0.6, 0.65)
-    assert main([str(bag), '--output', str(tmp_path)]) == 2
+    assert main([str(bag), '--output', str(tmp_path / 'out')]) == 2
     said = re.search(r'error: after (\d) scans: .*bag: cannot be read', capsys.readouterr().err)
-    assert summary(tmp_path)['successes'] == int(said[1]) > 0
-    assert len(read_kitti(tmp_path / 'trajectory_kitti.txt')) == int(said[1])
+    assert summary(tmp_path / 'out')['successes'] == int(said[1]) > 0
+    assert len(read_kitti(tmp_path / 'out/trajectory_kitti.txt')) == int(said[1])
 
 
 def test_clouds_that_are_gone_are_told(street_bag, tmp_path, capsys):
     bag = shutil.copytree(street_bag, tmp_path / 'bag')
     spoil_bytes(next(bag.glob('*.mcap')), 0.6, 0.9)
-    assert main([str(bag), '--output', str(tmp_path)]) == 0
+    assert main([str(bag), '--output', str(tmp_path / 'out')]) == 0
     assert re.search(r'the bag tells of 4 clouds, only \d came', capsys.readouterr().err)
-    assert summary(tmp_path)['scans'] < 4
+    assert summary(tmp_path / 'out')['scans'] < 4
 
 
 def spoil_bytes(path, begin, end):
@@ -334,13 +367,13 @@ def test_other_kinds_of_bags(street, tmp_path):
 
 def test_real_sequence(data_folder, tmp_path):
     assert kitti_to_bag([str(data_folder / 'kitti/08'), str(tmp_path / 'bag')]) == 0
-    assert main([str(tmp_path / 'bag'), '--output', str(tmp_path)]) == 0
+    assert main([str(tmp_path / 'bag'), '--output', str(tmp_path / 'out')]) == 0
     with AnyReader([tmp_path / 'bag']) as bag:
         truth = [bag.deserialize(raw, c.msgtype) for c, _, raw in bag.messages()
                  if c.topic == '/ground_truth']
-    poses = read_kitti(tmp_path / 'trajectory_kitti.txt')
+    poses = read_kitti(tmp_path / 'out/trajectory_kitti.txt')
     p, q = truth[-1].pose.pose.position, truth[-1].pose.pose.orientation
     assert np.linalg.norm(poses[-1, :3, 3] - [p.x, p.y, p.z]) < 0.3
     turn = Rotation.from_matrix(poses[-1, :3, :3]).inv() * Rotation.from_quat([q.x, q.y, q.z, q.w])
     assert np.degrees(turn.magnitude()) < 1.0
-    assert summary(tmp_path)['successes'] == 10
+    assert summary(tmp_path / 'out')['successes'] == 10

@@ -23,6 +23,7 @@ from sgor_ros.evaluation.protocols import record
 from sgor_ros.evaluation.protocols import studies
 from sgor_ros.evaluation.protocols.drives import posed
 from sgor_ros.evaluation.protocols.drives import strided
+from sgor_ros.evaluation.protocols.given import given_matches
 from sgor_ros.evaluation.protocols.indoor import cloud_of_depth
 from sgor_ros.evaluation.protocols.indoor import depth_frames
 from sgor_ros.evaluation.protocols.indoor import threedmatch
@@ -272,6 +273,18 @@ def test_depth_map_by_hand(tmp_path):
     scan = task.source.read()
     assert scan.points == pytest.approx(points)
     assert scan.labels.tolist() == [9, 9]
+
+
+@needs_data
+@pytest.mark.parametrize(('names', 'inlier', 'count'), [('kitti_*', 0.6, 3), ('3d*', 0.1, 1)])
+def test_matches_from_files(tmp_path, names, inlier, count):
+    """The shared sets, thinned by a study too."""
+    protocol = given_matches(DATA / 'correspondences', names, inlier)
+    found = run(protocol, [Entry('m', centroid)], tmp_path,
+                variants=[front_end.Variant('all'), front_end.Variant('9', matches=9)])
+    assert len(found) == 2 * count
+    assert all(r.matches > 4000 and r.right_share > 0.008 for r in found[:count])
+    assert {r.matches for r in found[count:]} == {9}
 
 
 @needs_data

@@ -22,14 +22,20 @@ def blas_threads():
             if pool['user_api'] == 'blas' and 'numpy' in pool['filepath']]
 
 
-def takers(count):
-    """Return the threads that took pieces of `count`, and how often each index was taken."""
+def takers(count, at_least=1):
+    """Return the threads that took pieces of `count`, and how often each index was taken.
+
+    Nobody goes on before `at_least` threads have come, however busy the machine is.
+    """
     found, taken = set(), np.zeros(count, int)
+    enough = threading.Event()
 
     def kernel(first, last):
         found.add(threading.get_ident())
         taken[first:last] += 1
-        time.sleep(0.002)
+        if len(found) >= at_least:
+            enough.set()
+        enough.wait(60.0)
     shared(kernel, count)
     return found, taken
 
@@ -42,9 +48,9 @@ def test_cores_holds_loops_and_blas_and_gives_them_back(monkeypatch):
         assert takers(100)[0] == {threading.get_ident()}
         assert set(blas_threads()) <= {1}
         with cores(3):
-            assert 1 < len(takers(100)[0]) <= 3
+            assert 2 <= len(takers(100, 2)[0]) <= 3
         assert takers(100)[0] == {threading.get_ident()}
-    assert len(takers(100)[0]) > 1
+    assert len(takers(100, 2)[0]) > 1
     assert blas_threads() == blas_before
 
 

@@ -23,6 +23,10 @@ from ..io.bags import BagReader
 from ..io.bags import CLOUD_TYPE
 from ..io.messages import matrix_of
 from ..io.messages import stamp_ns_of
+from .frame import FAILED
+from .frame import OK
+from .frame import Parser
+from .frame import run
 from .recorded_drive import Recorded
 from .recorded_drive import recorded_drive
 from .world_bag import STREET
@@ -46,25 +50,31 @@ LAST_ANSWER_S = 60.0
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run the demo; return 0 where all went well, 1 where not, 2 on unusable input."""
-    options = _parse(arguments)
+    """Run the command and return its exit code."""
+    return run(play, _parse(arguments))
+
+
+def play(options: argparse.Namespace) -> int:
+    """Run the demo; 1 where the node did badly."""
     try:
         return _run(options)
-    except InputError as error:
-        print(f'error: {error}', file=sys.stderr)
-        return 2
     except TimeoutError as error:
         return _fail(f'{error}; see {options.out}/node.log')
 
 
 def _parse(arguments: list[str] | None) -> argparse.Namespace:
-    parser = argparse.ArgumentParser(
-        prog='sgor_demo', description='Write a labelled bag of the built-in world, play '
-        'it to sgor_node over DDS in real time, and compare what the node publishes with the '
-        'ground truth.', formatter_class=argparse.ArgumentDefaultsHelpFormatter)
+    parser = Parser(
+        'sgor_demo', '[options]', 'Write a labelled bag of the built-in world, or read a recorded '
+        'drive, play it to sgor_node over DDS in real time, and compare what the node publishes '
+        'with the ground truth.',
+        ('sgor_demo', 'sgor_demo --place courtyard --scans 300',
+         'sgor_demo --data sequences/08 --scans 500'),
+        'done; a slow machine that leaves scans out is told so',
+        'the node ended, was silent, failed often, or drifted by more than '
+        f'{WORST_DRIFT_PERCENT:g} %')
     parser.add_argument('--out', type=Path, default=Path('out/demo'),
-                        help='folder for the bag, the pictures and the log; an older bag there '
-                        'is replaced')
+                        help='folder for the bag, the pictures and the log; those of an older '
+                        'demo are replaced')
     parser.add_argument('--scans', type=int, default=120,
                         help=f'scans to play; the bag has {BAG_SCANS} at most, more of them are '
                         'that drive forth and back')
@@ -89,14 +99,15 @@ def _run(options: argparse.Namespace) -> int:
         from ..ros.player import NodeProcess
         from ..ros.player import Player
     except ImportError as error:
-        raise InputError(f'no ROS 2 here ({error}): source /opt/ros/jazzy/setup.bash, or '
-                         "pip install 'sgor_ros[ros]'") from error
+        raise InputError(f'no ROS 2 here ({error}): source /opt/ros/jazzy/setup.bash, or pip '
+                         "install 'ros-jazzy-rclpy[fastrtps]' ros-jazzy-common-interfaces"
+                         ) from error
     out: Path = options.out
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f'--out {out}: {error.strerror}') from error
-    _say('starting sgor_node; the first start on a machine compiles, for a minute or two')
+    _say('starting sgor_node; the first start on a machine compiles, for half a minute')
     most = min(options.scans, BAG_SCANS)
     recorded = recorded_drive(options.data, most) if options.data else None
     convention = (recorded or SgorConfig()).label_convention
@@ -195,7 +206,7 @@ def _compare(player: 'Player', truth: dict[int, Array], world: WorldMap, memory_
                      f'see {out}/node.log')
     if errors.drift.stretches and not errors.drift.translation_percent < WORST_DRIFT_PERCENT:
         return _fail(f'the drift is above {WORST_DRIFT_PERCENT} %')
-    return 0
+    return OK
 
 
 def slowness(answered: int, sent: int, seconds: Array, rate: float) -> str:
@@ -248,7 +259,7 @@ def _say(message: str) -> None:
 
 def _fail(message: str) -> int:
     print(f'error: {message}', file=sys.stderr)
-    return 1
+    return FAILED
 
 
 if __name__ == '__main__':

@@ -1,5 +1,4 @@
 """`sgor_kitti_to_bag`: a sequence of SemanticKITTI becomes a bag of labelled clouds."""
-from argparse import ArgumentParser
 from argparse import Namespace
 from pathlib import Path
 import sys
@@ -13,8 +12,9 @@ from ..io.datasets import semantickitti
 from ..io.messages import odometry_of
 from ..io.messages import point_cloud2
 from ..io.trajectories import read_calibration
-from .options import parser
-from .options import run
+from .frame import OK
+from .frame import Parser
+from .frame import run
 
 CLOUD_TOPIC = '/points'
 TRUTH_TOPIC = '/ground_truth'
@@ -49,14 +49,19 @@ def convert(arguments: Namespace) -> int:
                                                    LIDAR_FRAME), stamp_ns)
     print(f'{arguments.out}: {len(drive)} clouds on {CLOUD_TOPIC}'
           + (f', poses on {TRUTH_TOPIC}' if poses is not None else ', no poses'))
-    return 0
+    return OK
 
 
-def _parser() -> ArgumentParser:
-    command = parser('Write a sequence in the layout of SemanticKITTI (velodyne/, labels/, '
-                     'times.txt; calib.txt and poses.txt where there are any) to an mcap bag.')
+def _parser() -> Parser:
+    command = Parser(
+        'sgor_kitti_to_bag', 'SEQUENCE OUT [options]', 'Write a sequence in the layout of '
+        'SemanticKITTI (velodyne/, labels/, times.txt; calib.txt and poses.txt where there are '
+        'any) to an mcap bag.',
+        ('sgor_kitti_to_bag sequences/08 bags/08',
+         'sgor_kitti_to_bag sequences/08 bags/08_predicted --labels predicted_labels'))
     command.add_argument('sequence', type=Path, help='folder of the sequence, such as .../08')
-    command.add_argument('out', type=Path, help='folder of the bag; must not exist')
+    command.add_argument('out', type=Path, help='folder of the bag, must not exist; it is '
+                         'there when it is complete')
     command.add_argument('--labels', default='labels', metavar='FOLDER',
                          help='folder in the sequence with a .label for each scan: labels, '
                          'predicted_labels')

@@ -1,10 +1,8 @@
-"""Command line options derived from the settings, and the frame around every command."""
-from argparse import ArgumentDefaultsHelpFormatter
+"""Command line options derived from the settings."""
 from argparse import ArgumentParser
 from argparse import BooleanOptionalAction
 from argparse import Namespace
 from argparse import SUPPRESS
-from collections.abc import Callable
 from collections.abc import Iterable
 from pathlib import Path
 import sys
@@ -15,26 +13,17 @@ import yaml
 from ..core.common.settings import InputError
 from ..core.common.settings import Setting
 from ..core.common.settings import Settings
+from ..core.config import SgorConfig
 from ..visualize import VIEWER
 
-REFUSED = 2
-INTERRUPTED = 130
+PRESETS = {'outdoor': SgorConfig.outdoor, 'indoor': SgorConfig.indoor, 'paper': SgorConfig.paper,
+           'kitti_protocol': SgorConfig.kitti_protocol}
 
 
-def parser(description: str) -> ArgumentParser:
-    """Return a parser whose help shows the defaults."""
-    return ArgumentParser(description=description, formatter_class=ArgumentDefaultsHelpFormatter)
-
-
-def run(command: Callable[[Namespace], int], arguments: Namespace) -> int:
-    """Run a command and return its exit code; what it refuses is told in one line."""
-    try:
-        return command(arguments)
-    except (InputError, OSError) as error:
-        print(f'error: {error}', file=sys.stderr)
-        return REFUSED
-    except KeyboardInterrupt:
-        return INTERRUPTED
+def add_preset(to: ArgumentParser) -> None:
+    """Add the option for the settings to start from."""
+    to.add_argument('--preset', choices=list(PRESETS), default='outdoor',
+                    help='settings of the registration to start from')
 
 
 def add_settings(to: ArgumentParser, title: str, settings: Iterable[Setting]) -> None:
@@ -115,5 +104,5 @@ def _help(item: Setting) -> str:
     bounds = [f'at least {item.minimum:g}' if item.minimum is not None else '',
               f'at most {item.maximum:g}' if item.maximum is not None else '']
     default = f'{item.default:.6g}' if item.kind is float else str(item.default)
-    text = f'{item.description}; {", ".join(filter(None, [*bounds, f"default {default}"]))}'
-    return text.replace('%', '%%')
+    details = ', '.join(filter(None, [*bounds, f'default {default}' if default else '']))
+    return '; '.join(filter(None, (item.description, details))).replace('%', '%%')

@@ -1,35 +1,40 @@
 """`sgor_register`: two scans from files, the transformation between them."""
-from argparse import ArgumentParser
 from argparse import Namespace
+from dataclasses import replace
 import json
 import math
 from pathlib import Path
 import sys
+import time
 from typing import Any
 
 import numpy as np
 
 from .. import visualize
 from ..core.common import se3
+from ..core.common.settings import InputError
 from ..core.config import SgorConfig
 from ..core.registration import register
 from ..core.result import Registration
 from ..core.scan.preprocessing import preprocess
 from ..core.scan.scan import SemanticScan
 from ..core.warmup import warm_up
+from ..io.plots import PICTURES
 from ..io.plots import plot_registration
 from ..io.scans import read_scan
+from ..io.writing import check_file
+from ..io.writing import new_file
+from .frame import FAILED
+from .frame import OK
+from .frame import Parser
+from .frame import run
 from .options import add_params_file
+from .options import add_preset
 from .options import add_settings
 from .options import add_visualize
 from .options import configured
-from .options import parser
+from .options import PRESETS
 from .options import read_parameters
-from .options import run
-
-FAILED = 1
-PRESETS = {'outdoor': SgorConfig.outdoor, 'indoor': SgorConfig.indoor, 'paper': SgorConfig.paper,
-           'kitti_protocol': SgorConfig.kitti_protocol}
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -39,6 +44,7 @@ def main(argv: list[str] | None = None) -> int:
 
 def register_files(arguments: Namespace) -> int:
     """Register and tell; 1 where the scans could not be registered."""
+    _check_outputs(arguments)
     config = configured(PRESETS[arguments.preset](), arguments,
                         read_parameters(arguments, SgorConfig.settings()))
     if arguments.visualize is not None:
@@ -47,24 +53,34 @@ def register_files(arguments: Namespace) -> int:
     source = read_scan(arguments.source, arguments.source_labels)
     target = read_scan(arguments.target, arguments.target_labels)
     warm_up(config)
-    result = register(preprocess(source, config),
-                      preprocess(target, config.replace(label_convention=convention)), config)
+    begin = time.perf_counter()
+    prepared = (preprocess(source, config),
+                preprocess(target, config.replace(label_convention=convention)))
+    preprocessing = time.perf_counter() - begin
+    result = register(*prepared, config)
+    result = replace(result, timings={
+        **result.timings, 'preprocessing': preprocessing + result.timings['preprocessing']})
     for warning in result.warnings:
         print(f'warning: {warning}', file=sys.stderr)
     print(_text(result))
     if arguments.json:
-        arguments.json.write_text(json.dumps(_as_dict(result, arguments), indent=2) + '\n')
+        with new_file(arguments.json) as place:
+            place.write_text(json.dumps(_as_dict(result, arguments), indent=2) + '\n')
     if arguments.plot:
         _plot(arguments, source, target, result)
     if arguments.visualize is not None:
         with visualize.pair_view(arguments.visualize, config) as look:
             look.show(source, target, result, _text(result))
-    return 0 if result.success else FAILED
+    return OK if result.success else FAILED
 
 
-def _parser() -> ArgumentParser:
-    command = parser('Register two scans without an initial guess and print T_target_source, '
-                     'which maps points of the source into the target.')
+def _parser() -> Parser:
+    command = Parser(
+        'sgor_register', 'SOURCE TARGET [options]', 'Register two scans without an initial guess '
+        'and print T_target_source, which maps points of the source into the target.',
+        ('sgor_register a.bin b.bin --source-labels a.label --target-labels b.label',
+         'sgor_register a.ply b.ply --preset indoor --json result.json --plot pair.png'),
+        'registered', 'not registered; the reason is told')
     command.add_argument('source', type=Path, help='.bin, .pcd, .ply or .npz')
     command.add_argument('target', type=Path, help='likewise')
     for side in ('source', 'target'):
@@ -72,15 +88,32 @@ def _parser() -> ArgumentParser:
                              help=f'labels of the {side}: uint32 or uint8 a point')
     command.add_argument('--target-label-convention', metavar='STR',
                          help='where the labels of the target mean something else')
-    command.add_argument('--preset', choices=list(PRESETS), default='outdoor',
-                         help='settings to start from')
-    command.add_argument('--json', type=Path, metavar='FILE', help='write the result to')
-    command.add_argument('--plot', type=Path, metavar='FILE', help='draw the result to (PNG)')
+    add_preset(command)
+    command.add_argument('--json', type=Path, metavar='FILE', help='write the result to; an older '
+                         'file is replaced')
+    command.add_argument('--plot', type=Path, metavar='FILE', help='draw the result to '
+                         f'({", ".join(PICTURES)}), likewise')
     add_visualize(command)
     add_params_file(command)
     add_settings(command, 'settings (defaults are those of the preset outdoor)',
                  SgorConfig.settings())
     return command
+
+
+def _check_outputs(arguments: Namespace) -> None:
+    """Refuse what could not be written after the work, or would replace what is read."""
+    inputs = [path.resolve() for path in (arguments.source, arguments.target,
+                                          arguments.source_labels, arguments.target_labels)
+              if path is not None]
+    for option, path, endings in (('--json', arguments.json, ()),
+                                  ('--plot', arguments.plot, PICTURES)):
+        if path is None:
+            continue
+        check_file(path, option, endings)
+        if path.resolve() in inputs:
+            raise InputError(f'{option} {path}: would replace an input')
+    if arguments.json and arguments.plot and arguments.json.resolve() == arguments.plot.resolve():
+        raise InputError(f'--plot {arguments.plot}: the same file as --json')
 
 
 def _text(result: Registration) -> str:
@@ -99,7 +132,8 @@ def _text(result: Registration) -> str:
         lines.append('standard deviation x y z ' + ' '.join(f'{100 * s:.1f}' for s in sigma[:3])
                      + ' cm, rotation ' + ' '.join(f'{math.degrees(s):.3f}' for s in sigma[3:])
                      + ' deg')
-    lines.append(f'took {1e3 * sum(result.timings.values()):.0f} ms')
+    lines.append(f'took {1e3 * sum(result.timings.values()):.0f} ms, '
+                 f'{1e3 * result.timings["preprocessing"]:.0f} of them to preprocess both scans')
     return '\n'.join(lines)
 
 

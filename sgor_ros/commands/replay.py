@@ -1,7 +1,7 @@
 """`sgor_replay`: the tracker over a bag, without ROS; the same poses as the node's."""
-from argparse import ArgumentParser
 from argparse import Namespace
 from contextlib import ExitStack
+from contextlib import nullcontext
 from dataclasses import asdict
 import json
 import math
@@ -27,15 +27,21 @@ from ..io.environment import describe_environment
 from ..io.stream_config import StreamConfig
 from ..io.trajectories import write_kitti
 from ..io.trajectories import write_tum
+from ..io.writing import free_folder
+from ..io.writing import new_folder
 from ..tracker import Tracker
 from ..tracker import TrackerConfig
+from .frame import FAILED
+from .frame import OK
+from .frame import Parser
+from .frame import run
 from .options import add_params_file
+from .options import add_preset
 from .options import add_settings
 from .options import add_visualize
 from .options import configured
-from .options import parser
+from .options import PRESETS
 from .options import read_parameters
-from .options import run
 from .replay_steps import Row
 from .replay_steps import Steps
 from .replay_steps import Warnings
@@ -47,19 +53,20 @@ def main(argv: list[str] | None = None) -> int:
 
 
 def replay(arguments: Namespace) -> int:
-    """Track the clouds of a bag and write the results."""
+    """Track the clouds of a bag and write the results; 1 where no scan could be registered."""
     parameters = read_parameters(arguments, [
         *SgorConfig.settings(), *TrackerConfig.settings(), *StreamConfig.settings()])
     stream = configured(StreamConfig(), arguments, parameters)
     drive = (None if is_bag(arguments.bag_path)
              else open_drive(arguments.bag_path, arguments.sequence))
-    start = SgorConfig() if drive is None else SgorConfig(label_convention=drive.label_convention)
+    start = PRESETS[arguments.preset]()
+    if drive is not None:
+        start = start.replace(label_convention=drive.label_convention)
     tracker = Tracker(configured(start, arguments, parameters),
                       configured(TrackerConfig(), arguments, parameters))
     if arguments.visualize is not None:
         visualize.check(arguments.visualize)
     label_convention(tracker.config.label_convention)
-    output: Path = arguments.output or Path('out') / arguments.bag_path.stem
     warnings = Warnings()
     rows: list[Row] = []
     broken: InputError | None = None
@@ -69,49 +76,71 @@ def replay(arguments: Namespace) -> int:
             else stack.enter_context(DriveReader(drive)))
         topic = arguments.topic or bag.find_topic(stream.label_field)
         clouds, expected = bag.clouds(topic), bag.cloud_topics()[topic]
-        output.mkdir(parents=True, exist_ok=True)
-        writer = stack.enter_context(BagWriter(output / 'bag')) if arguments.bag else None
-        warm_up(tracker.config)
-        look = (None if arguments.visualize is None else stack.enter_context(
-            visualize.track_view(arguments.visualize, tracker.config)))
-        steps = Steps(tracker, stream, writer, warnings, look)
-        try:
-            for cloud in tqdm(clouds, total=expected, unit='scan', disable=None):
-                rows.append(steps.take(cloud))
-        except InputError as error:
-            broken = error    # what came before is worth keeping
-    if broken and not rows:
-        raise broken
-    if len(rows) < expected:
-        warnings.add(f'{topic}: the bag tells of {expected} clouds, only {len(rows)} came')
-    if all(row.T_odom_sensor is None for row in rows):
-        raise InputError(f'{topic}: none of {len(rows)} clouds could be used: {rows[0].reason}')
-    summary = _summary(rows, warnings.texts, arguments.bag_path, topic, tracker, stream)
-    _write(output, rows, summary, f'{arguments.bag_path.name} {topic}')
+        output: Path = arguments.output or free_folder(_usual_output(arguments))
+        place = stack.enter_context(new_folder(output))
+        place.mkdir()
+        with BagWriter(place / 'bag') if arguments.bag else nullcontext() as writer:
+            warm_up(tracker.config)
+            look = (None if arguments.visualize is None else stack.enter_context(
+                visualize.track_view(arguments.visualize, tracker.config)))
+            steps = Steps(tracker, stream, writer, warnings, look)
+            try:
+                for cloud in tqdm(clouds, total=expected, unit='scan', disable=None):
+                    rows.append(steps.take(cloud))
+            except InputError as error:
+                broken = error    # what came before is worth keeping
+        if broken and not rows:
+            raise broken
+        if len(rows) < expected:
+            warnings.add(f'{topic}: the bag tells of {expected} clouds, only {len(rows)} came')
+        if all(row.T_odom_sensor is None for row in rows):
+            raise InputError(f'{topic}: none of {len(rows)} clouds could be used: '
+                             f'{rows[0].reason}')
+        summary = _summary(rows, warnings.texts, arguments.bag_path, topic, tracker, stream)
+        _write(place, rows, summary, f'{arguments.bag_path.name} {topic}')
     _print(summary, output)
     if broken:
         raise InputError(f'after {len(rows)} scans: {broken}')
-    return 0
+    if len(rows) > 1 and all(row.T_odom_sensor is None or row.restarted for row in rows):
+        print('error: no scan could be registered to another', file=sys.stderr)
+        return FAILED
+    return OK
 
 
-def _parser() -> ArgumentParser:
-    command = parser('Track the labelled clouds of a bag (ROS 2 mcap or sqlite3, ROS 1), or the '
-                     'scans of a folder (SemanticKITTI and others, see docs/data.md), and write '
-                     'trajectory.tum, trajectory_kitti.txt, summary.json and trajectory.png.')
+def _parser() -> Parser:
+    command = Parser(
+        'sgor_replay', 'BAG [options]', 'Track the labelled clouds of a bag (ROS 2 mcap or '
+        'sqlite3, ROS 1), or the scans of a folder (SemanticKITTI and others, see docs/data.md), '
+        'and write trajectory.tum, trajectory_kitti.txt, summary.json and trajectory.png into a '
+        'new folder.',
+        ('sgor_replay bags/drive', 'sgor_replay sequences/08 --visualize',
+         'sgor_replay drive.bag --topic /points --output out/first --bag'),
+        'done; scans that failed are told and counted',
+        'no scan could be registered to another; the results are written')
     command.add_argument('bag_path', type=Path, metavar='BAG', help='or folder of scans')
     command.add_argument('--topic', help='of the clouds; found where there is but one')
     command.add_argument('--sequence', metavar='NAME', help='of the drives of a folder; found '
                          'where there is but one')
     command.add_argument('--output', type=Path, metavar='FOLDER',
-                         help='for the results; default: out/ and the name of the bag')
+                         help='for the results, must not exist; default: out/NAME_replay with the '
+                         'name of the bag, and _2, _3, ... behind it where that exists')
     command.add_argument('--bag', action='store_true',
                          help='also write a bag with /pose, /odometry and /correspondences')
     add_visualize(command)
     add_params_file(command)
+    add_preset(command)
     add_settings(command, 'clouds and frames', StreamConfig.settings())
     add_settings(command, 'tracker', TrackerConfig.settings())
-    add_settings(command, 'registration', SgorConfig.settings())
+    add_settings(command, 'registration (defaults are those of the preset outdoor)',
+                 SgorConfig.settings())
     return command
+
+
+def _usual_output(arguments: Namespace) -> Path:
+    """Return a folder that is not the bag's own, where a bag lies in out/ too."""
+    bag: Path = arguments.bag_path
+    name = arguments.sequence or (bag.resolve().name if bag.is_dir() else bag.stem)
+    return Path('out') / f'{name.replace("/", "_")}_replay'
 
 
 def _summary(rows: list[Row], warnings: list[str], bag: Path, topic: str, tracker: Tracker,

@@ -25,7 +25,7 @@ def scene_kinds(names: Sequence[str]) -> dict[str, bool]:
         from ..world.scenes import KINDS
     except ImportError as error:
         raise InputError(f'the built-in world needs Open3D ({error}): '
-                         "pip install 'sgor_ros[benchmark]'") from error
+                         'pip install open3d') from error
     for name in names:
         if name not in KINDS:
             raise InputError(f'--kinds {name}: not one of {", ".join(KINDS)}')

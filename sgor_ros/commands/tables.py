@@ -1,5 +1,4 @@
 """`sgor_tables`: the tables and studies of the paper, on your data or in the built-in world."""
-from argparse import ArgumentParser
 from argparse import Namespace
 from collections.abc import Callable
 from collections.abc import Sequence
@@ -22,6 +21,7 @@ from ..evaluation.protocols import studies
 from ..evaluation.protocols.drives import posed
 from ..evaluation.protocols.drives import strided
 from ..evaluation.protocols.front_end import Features
+from ..evaluation.protocols.given import given_matches
 from ..evaluation.protocols.indoor import depth_frames
 from ..evaluation.protocols.indoor import threedmatch
 from ..evaluation.protocols.kitti import kitti_10m
@@ -36,27 +36,30 @@ from ..evaluation.rivals import Answer
 from ..io.datasets import Drive
 from ..io.datasets import Frame
 from ..io.datasets import open_drives
-from . import options
+from . import frame
 
 SPEED_M_S = 8.0
 ABLATION = 'ablation'
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a protocol; return 0, or 2 on unusable input."""
-    return options.run(_tables, _parser().parse_args(arguments))
+    """Run the command and return its exit code."""
+    return frame.run(_tables, _parser().parse_args(arguments))
 
 
-def _parser() -> ArgumentParser:
-    parser = options.parser(
+def _parser() -> frame.Parser:
+    parser = frame.Parser(
+        'sgor_tables', 'PROTOCOL [options]',
         'Run a protocol of the literature with every method on the same matches, and print its '
         'table beside the published rows. Stopped, it goes on where it was when it is started '
-        'again with the same --output.')
+        'again with the same --output.',
+        ('sgor_tables strides', 'sgor_tables kitti-10m --data sequences --output out/kitti'))
     add = parser.add_argument
     add('protocol', choices=list(PROTOCOLS),
         help='kitti-10m: the 555 pairs by their rule or --list; kitti-loops: lists of loops in '
         'bands; 3dmatch: fragments and gt.log, 3DLoMatch likewise; depth: single depth maps; '
-        'strides: keyframes so many apart; poses: all pairs of posed scans up to a distance')
+        'strides: keyframes so many apart; poses: all pairs of posed scans up to a distance, and '
+        'of pairs.json; matches: from files')
     add('--data', type=Path, metavar='FOLDER',
         help='with folders velodyne, labels and poses.txt up to two levels below, or the scenes '
         'of 3DMatch; without it the built-in world')
@@ -66,6 +69,9 @@ def _parser() -> ArgumentParser:
         help='refine the truth by ICP, kept in OUTPUT/truth.json')
     add('--strides', type=int, nargs='+', metavar='N', default=(1, 2, 4))
     add('--max-distance', type=float, metavar='M', default=30.0)
+    add('--sets', default='*', metavar='GLOB', help='names of the sets of matches')
+    add('--inlier', type=float, default=0.6, metavar='M',
+        help='of matches from files: 0.1 indoors')
     add('--scans', type=int, default=120, help='of the built-in world')
     add('--limit', type=int, default=0, metavar='PAIRS', help='evenly spread; 0: all')
     add('--methods', nargs='+', metavar='NAME', help='of the table; default: all that there are')
@@ -105,7 +111,7 @@ def _tables(arguments: Namespace) -> int:
                   variants=studies.variants(study, arguments.values, arguments.seed),
                   processes=arguments.processes, dask=arguments.dask)
     print(page.write(output, records, protocol, entries, study, features))
-    return 0
+    return frame.OK
 
 
 def _entries(arguments: Namespace, protocol: Protocol) -> list[Entry]:
@@ -116,7 +122,7 @@ def _entries(arguments: Namespace, protocol: Protocol) -> list[Entry]:
                 for name, changes in rows.items()]
     entries = [Entry('SGOR', sgor(own))]
     entries += [Entry(name, method) for name, method in rivals(_say).items()]
-    if arguments.raw:
+    if arguments.raw and all(task.matches is None for task in protocol.tasks):
         methods = [on_scans.sgor('SGOR, all of ours, from scans', _everything(protocol)),
                    *on_scans.rivals(_say).values()]
         entries += [Entry(method.name, on_scans=partial(_from_scans, method))
@@ -136,6 +142,8 @@ def _everything(protocol: Protocol) -> SgorConfig:
 
 
 def _from_scans(method: on_scans.Method, task: Task) -> Answer:
+    assert task.source is not None
+    assert task.target is not None
     return method.run(on_scans.Sample(task.source.read(), task.target.read(),
                                       task.source.label_convention,
                                       task.target.label_convention, 0))
@@ -173,6 +181,18 @@ def _kitti_10m(arguments: Namespace) -> Protocol:
     drives = _drives(arguments)
     return kitti_10m(drives, [d.T_world_sensor[:, :3, 3] for d in drives
                               if d.T_world_sensor is not None])
+
+
+def _poses(arguments: Namespace) -> Protocol:
+    listed = (pairing.listed_pairs(arguments.data, arguments.max_distance)
+              if arguments.data else [])
+    return posed(_drives(arguments), arguments.max_distance, listed)
+
+
+def _matches(arguments: Namespace) -> Protocol:
+    if arguments.data is None:
+        raise InputError('matches: name the folder of the sets by --data')
+    return given_matches(arguments.data, arguments.sets, arguments.inlier)
 
 
 def _kitti_loops(arguments: Namespace) -> Protocol:
@@ -220,7 +240,8 @@ PROTOCOLS: dict[str, Callable[[Namespace], Protocol]] = {
     '3dmatch': partial(_indoor, depth=False),
     'depth': partial(_indoor, depth=True),
     'strides': lambda arguments: strided(_drives(arguments), arguments.strides),
-    'poses': lambda arguments: posed(_drives(arguments), arguments.max_distance)}
+    'poses': _poses,
+    'matches': _matches}
 
 if __name__ == '__main__':
     sys.exit(main())

@@ -55,8 +55,8 @@ def write_world_bag(path: Path, scans: int, seed: int, place: str = STREET
         from ..world import scenes
         from ..world import simulate
     except ImportError as error:
-        raise InputError(f"the built-in world needs Open3D ({error}): pip install "
-                         "'sgor_ros[open3d]'") from error
+        raise InputError(f'the built-in world needs Open3D ({error}): pip install open3d'
+                         ) from error
     if place != STREET and place not in scenes.KINDS:
         raise InputError(f'place {place!r}: not one of {STREET}, {", ".join(scenes.KINDS)}')
     print(f'building the world and a bag of {scans} scans: {path}', flush=True)

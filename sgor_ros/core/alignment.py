@@ -5,6 +5,7 @@ import numpy as np
 from numpy.typing import NDArray
 import small_gicp
 
+from .common.threads import openmp_threads
 from .config import SgorConfig
 from .covariance import noise
 from .covariance import repeating
@@ -61,6 +62,7 @@ def surface(points: NDArray[np.float64], threads: int) -> Surface | None:
     if len(points) < NEIGHBOURS:
         return None
     cloud = small_gicp.PointCloud(points)
+    threads = openmp_threads(threads)
     tree = small_gicp.KdTree(cloud, num_threads=threads)
     small_gicp.estimate_covariances(cloud, tree, num_neighbors=NEIGHBOURS, num_threads=threads)
     return Surface(cloud, tree, float(np.median(np.linalg.norm(points, axis=1))))
@@ -71,7 +73,7 @@ def align(source: Surface, target: Surface, T_target_source: NDArray[np.float64]
     """Refine a transformation by GICP, from within `local_reach`."""
     result = small_gicp.align(
         target.cloud, source.cloud, target.tree, T_target_source, registration_type='GICP',
-        max_correspondence_distance=config.local_reach, num_threads=config.threads,
+        max_correspondence_distance=config.local_reach, num_threads=openmp_threads(config.threads),
         max_iterations=30)
     T = np.asarray(result.T_target_source)
     pairs = int(result.num_inliers)

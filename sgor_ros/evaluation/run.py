@@ -164,7 +164,7 @@ def installed(module: str, say: Callable[[str], None]) -> bool:
     """Tell whether a rival's module is there, and say so if it is not."""
     if find_spec(module) is not None:
         return True
-    say(f"{module} is not installed, so left out; pip install 'sgor_ros[benchmark]'")
+    say(f'{module} is not installed, so left out; to have it: pip install {module}')
     return False
 
 

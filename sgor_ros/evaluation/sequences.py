@@ -76,7 +76,7 @@ def odometries(config: SgorConfig, say: Callable[[str], None], *, unlabelled: bo
     """Return what makes each odometry, by name; rivals where they are installed."""
     makers = trackers(config, unlabelled=unlabelled)
     if find_spec('kiss_icp') is None:
-        say("kiss_icp is not installed, so left out; pip install 'sgor_ros[benchmark]'")
+        say('kiss_icp is not installed, so left out; to have it: pip install kiss-icp')
     else:
         makers['KISS-ICP'] = lambda: _unlabelled(kiss_icp())
     makers['small_gicp, scan to scan'] = lambda: _unlabelled(scan_to_scan(config.threads))

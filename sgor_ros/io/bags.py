@@ -2,6 +2,7 @@
 from collections.abc import Callable
 from collections.abc import Iterator
 from contextlib import AbstractContextManager
+from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -15,7 +16,6 @@ from rosbags.highlevel import AnyReader
 from rosbags.interfaces import Connection
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer
-from rosbags.rosbag2 import WriterError
 from rosbags.typesys import get_typestore
 from rosbags.typesys import Stores
 
@@ -26,6 +26,8 @@ from .label_field import field_names
 from .label_field import label_field_of
 from .messages import matrix_of
 from .messages import stamp_ns_of
+from .writing import new_folder
+from .writing import refuse_existing
 
 MENDS = {'.mcap': 'mcap recover', '.bag': 'rosbag reindex', '.db3': 'ros2 bag reindex',
          '': 'ros2 bag reindex (or mcap recover, for its .mcap)'}
@@ -194,6 +196,8 @@ class BagReader:
 class BagWriter:
     """Writes an mcap bag that Jazzy plays; use it in a ``with``.
 
+    The bag is there once it is complete, at the end of the ``with``; after an error there is none.
+
     Parameters
     ----------
     path : str or Path
@@ -206,24 +210,24 @@ class BagWriter:
     """
 
     def __init__(self, path: str | Path) -> None:
+        self._path = Path(path)
         self._store = KNOWN
         self._connections: dict[str, Connection] = {}
-        try:
-            self._writer = Writer(
-                Path(path), version=Writer.VERSION_LATEST, storage_plugin=StoragePlugin.MCAP)
-        except WriterError as error:
-            raise InputError(str(error)) from error
+        refuse_existing(self._path)
 
     def __enter__(self) -> Self:
-        """Create the bag."""
-        self._writer.path.parent.mkdir(parents=True, exist_ok=True)
-        self._writer.open()
+        """Create the bag beside its place."""
+        with ExitStack() as stack:
+            place = stack.enter_context(new_folder(self._path))
+            self._writer = stack.enter_context(Writer(
+                place, version=Writer.VERSION_LATEST, storage_plugin=StoragePlugin.MCAP))
+            self._open = stack.pop_all()
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
                  trace: TracebackType | None) -> None:
-        """Finish the bag."""
-        self._writer.__exit__(kind, error, trace)
+        """Finish the bag and move it to its place, or clear it away."""
+        self._open.__exit__(kind, error, trace)
 
     def types(self, name: str) -> Any:
         """Return the message class of a name such as ``'nav_msgs/msg/Odometry'``."""

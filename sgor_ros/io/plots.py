@@ -17,6 +17,9 @@ from .colours import INLIER
 from .colours import REJECTED
 from .colours import SOURCE
 from .colours import TARGET
+from .writing import new_file
+
+PICTURES = ('.png', '.pdf', '.svg')
 
 Array = NDArray[np.float64]
 
@@ -39,7 +42,7 @@ def plot_registration(path: str | Path, title: str, source: SemanticScan, target
     Parameters
     ----------
     path : str or Path
-        PNG to write.
+        Picture to write; its ending is one of `PICTURES`.
     title : str
     source, target : SemanticScan
     result : Registration
@@ -82,13 +85,14 @@ def new_figure(width: float, height: float,
 
 
 def save(figure: Any, path: str | Path) -> None:
-    """Give the axes of a figure their looks and write it as PNG."""
+    """Give the axes of a figure their looks and write it."""
     for axes in figure.axes:
         axes.grid(True, color='#e3e6ea', lw=0.6)
         axes.set_axisbelow(True)
         axes.spines[['top', 'right']].set_visible(False)
         axes.title.set_fontsize(10)
-    figure.savefig(path, dpi=130, bbox_inches='tight', pad_inches=0.15)
+    with new_file(path) as place:
+        figure.savefig(place, dpi=130, bbox_inches='tight', pad_inches=0.15)
 
 
 def _on_ground(points: NDArray[Any], ground: Ground | None) -> NDArray[np.bool_]:

@@ -1,4 +1,7 @@
 """A log that tells everything and is still readable at ten scans a second."""
+from collections.abc import Iterator
+from contextlib import contextmanager
+import logging
 import re
 import time
 from typing import Any
@@ -7,6 +10,27 @@ PERIOD_S = 2.0
 REMEMBERED = 1000
 # a number, or a list of them
 NUMBERS = re.compile(r'\d+(?:[.,\s]*\d+)*')
+
+
+class _Forward(logging.Handler):
+    def __init__(self, logger: Any) -> None:
+        super().__init__()
+        self._logger = logger
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self._logger.warning(record.getMessage())
+
+
+@contextmanager
+def forwarded(logger: Any) -> Iterator[None]:
+    """Pass on to a logger of rclpy what the library says meanwhile."""
+    forward = _Forward(logger)
+    library = logging.getLogger('sgor_ros')
+    library.addHandler(forward)
+    try:
+        yield
+    finally:
+        library.removeHandler(forward)
 
 
 class SparingLog:

@@ -3,6 +3,7 @@
 Exit codes: 0 after SIGINT or SIGTERM, at any moment; 2 where it cannot start as it was told to;
 1 with a traceback where the program is wrong.
 """
+from importlib import metadata
 import os
 import sys
 from typing import TYPE_CHECKING
@@ -14,14 +15,35 @@ if TYPE_CHECKING:
 
 # how long the executor waits before it looks for a signal
 PATIENCE_S = 0.1
+HELP = """\
+usage: sgor_node [--ros-args [-r points:=TOPIC] [-p NAME:=VALUE ...] [--params-file YAML]]
+
+Odometry and relative poses from labelled clouds (sensor_msgs/PointCloud2 on `points`), as a ROS 2
+node. Parameters, with unit, bounds and meaning: config/sgor_node.yaml, which is a parameter file.
+
+examples:
+  ros2 run sgor_ros sgor_node --ros-args -r points:=/lidar/labelled
+  ros2 run sgor_ros sgor_node --ros-args -p mode:=consecutive -p voxel_size:=0.3
+  ros2 param describe /sgor_node voxel_size
+
+exit codes:
+  0    ended by SIGINT or SIGTERM
+  1    a fault of the program (with a traceback)
+  2    cannot start as it was told to"""
 
 
 def main(args: list[str] | None = None) -> int:
     """Run the node until a signal comes; return the exit code of the process."""
     signals.end_at_once()
+    if asked := _asked(sys.argv[1:] if args is None else args):
+        print(asked)
+        return 0
     # late: this takes a second, in which signals must do already
-    import rclpy
-    from rclpy.signals import SignalHandlerOptions
+    try:
+        import rclpy
+        from rclpy.signals import SignalHandlerOptions
+    except ImportError as error:
+        return _refuse(f'no ROS 2 here ({error}): source /opt/ros/jazzy/setup.bash')
 
     from ..core.common.settings import InputError
     from .sgor_node import SgorNode
@@ -64,7 +86,15 @@ def _run(node: 'SgorNode', flag: signals.SignalFlag) -> int:
     return 0
 
 
-def _refuse(error: Exception) -> int:
+def _asked(args: list[str]) -> str:
+    """Return what was asked for in place of a node: needs no ROS."""
+    own = args[:args.index('--ros-args')] if '--ros-args' in args else args
+    if '--version' in own:
+        return f'sgor_ros {metadata.version("sgor_ros")}'
+    return HELP if {'-h', '--help'} & set(own) else ''
+
+
+def _refuse(error: Exception | str) -> int:
     print(f'error: {error}', file=sys.stderr)
     return 2
 

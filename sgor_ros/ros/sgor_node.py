@@ -23,14 +23,13 @@ from .clouds import override_names
 from .commands import Commands
 from .gaps import Gaps
 from .health import Health
+from .log import forwarded
 from .log import SparingLog
 from .outputs import Outputs
 from .parameters import NodeParameters
 from .publishers import refuse_unknown_overrides
 from .slot import NewestSlot
 
-# before this, loading is nothing to talk about
-COMPILING_S = 1.0
 # a scan at work is finished before the end, unless it takes this long
 GRACE_S = 3.0
 
@@ -120,15 +119,9 @@ class SgorNode(Node):
 
     def _warm_up(self) -> None:
         log = self.get_logger()
-        said = threading.Timer(COMPILING_S, log.info, [
-            'compiling; once, the result is kept for the next start'])
         begin = time.monotonic()
-        said.start()
-        try:
+        with forwarded(log):
             warm_up(self._settings.live[0])
-        finally:
-            said.cancel()
-            said.join()
         log.info(f'ready after {time.monotonic() - begin:.1f} s, waiting for clouds on '
                  f'{self.resolve_topic_name("points")}')
 

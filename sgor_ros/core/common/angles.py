@@ -6,7 +6,7 @@ import numpy as np
 
 
 @numba.njit(cache=True, nogil=True, inline='always')
-def atan2(y, x):  # type: ignore[no-untyped-def]
+def atan2(y, x):
     """Return the angle of (x, y) in float32, radians in [-pi, pi], good to 2e-6."""
     ax = abs(x)
     ay = abs(y)

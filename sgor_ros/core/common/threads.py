@@ -20,6 +20,8 @@ os.environ.setdefault('OMP_WAIT_POLICY', 'passive')
 import numba
 from threadpoolctl import ThreadpoolController
 
+from . import compiling as compiling  # listens from now on
+
 PIECES = 8
 """Pieces of the work for each thread: the last one to end leaves the others idle."""
 
@@ -34,8 +36,24 @@ _blas = ThreadpoolController().select(user_api='blas')
 _CORES = len(os.sched_getaffinity(0)) if hasattr(os, 'sched_getaffinity') else os.cpu_count() or 1
 _allowed = threading.local()
 _pool: list[ThreadPoolExecutor] = []
-# a child has none of the threads of its parent
-os.register_at_fork(after_in_child=_pool.clear)
+_forked = threading.Event()
+
+
+def _in_child() -> None:
+    """Forget the threads of the parent, of which a forked child has none."""
+    _pool.clear()
+    _forked.set()
+
+
+os.register_at_fork(after_in_child=_in_child)
+
+
+def openmp_threads(count: int) -> int:
+    """Return how many threads small_gicp may use where `count` are allowed.
+
+    One in a forked child: OpenMP would wait there for ever for the threads that it had before.
+    """
+    return 1 if _forked.is_set() else count
 
 
 @contextmanager

@@ -196,7 +196,7 @@ def _voted(points: NDArray[np.float64], ids: NDArray[np.int64], convention: Labe
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True)
-def _nearest_in_runs(begin, end, source, target, first, last,  # type: ignore[no-untyped-def]
+def _nearest_in_runs(begin, end, source, target, first, last,
                      nearest):
     """Write for each source row the nearest target row of its runs, -1 for empty ones."""
     for i in range(np.uint64(begin), np.uint64(end)):

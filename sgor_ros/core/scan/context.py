@@ -81,7 +81,7 @@ def semantic_context(points: NDArray[np.float64], labels: NDArray[np.uint8], gro
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True)
-def _blur_rows(x, y, occupied, kernel, rows):  # type: ignore[no-untyped-def]
+def _blur_rows(x, y, occupied, kernel, rows):
     """Blur maps of occupied places along the first axis: (nx, ny, C)."""
     half = len(kernel) // 2
     for i in range(len(x)):
@@ -92,7 +92,7 @@ def _blur_rows(x, y, occupied, kernel, rows):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True)
-def _blur_columns(first, last, x, y, rows, kernel, out):  # type: ignore[no-untyped-def]
+def _blur_columns(first, last, x, y, rows, kernel, out):
     """Blur maps along the second axis, where they are wanted: (P, C)."""
     half = len(kernel) // 2
     for i in range(first, last):

@@ -73,7 +73,7 @@ def unit_rows(descriptors: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 @numba.njit(cache=True, nogil=True)
-def _sum_votes(first, last, own, start, index, squared, limit,  # type: ignore[no-untyped-def]
+def _sum_votes(first, last, own, start, index, squared, limit,
                votes):
     for i in range(np.uint64(first), np.uint64(last)):
         for k in range(start[i], start[i + 1]):
@@ -83,7 +83,7 @@ def _sum_votes(first, last, own, start, index, squared, limit,  # type: ignore[n
 
 
 @numba.njit(cache=True, nogil=True)
-def _normals(first, last, points, start, index, squared, limit,  # type: ignore[no-untyped-def]
+def _normals(first, last, points, start, index, squared, limit,
              found):
     for i in range(np.uint64(first), np.uint64(last)):
         n = 0
@@ -118,7 +118,7 @@ def _normals(first, last, points, start, index, squared, limit,  # type: ignore[
 
 
 @numba.njit(cache=True, nogil=True)
-def _smallest_direction(xx, xy, xz, yy, yz, zz):  # type: ignore[no-untyped-def]
+def _smallest_direction(xx, xy, xz, yy, yz, zz):
     """Return the unit eigenvector of the smallest eigenvalue of a symmetric 3 x 3 matrix."""
     mean = (xx + yy + zz) / 3
     a, b, c = xx - mean, yy - mean, zz - mean
@@ -148,7 +148,7 @@ def _smallest_direction(xx, xy, xz, yy, yz, zz):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)
-def _across(a, xy, xz, b, yz, c):  # type: ignore[no-untyped-def]
+def _across(a, xy, xz, b, yz, c):
     """Return a direction across the longest row of a symmetric matrix of rank one."""
     if a >= b and a >= c:
         x, y, z = a, xy, xz
@@ -160,21 +160,21 @@ def _across(a, xy, xz, b, yz, c):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True, inline='always')
-def _angle_bin(y, x):  # type: ignore[no-untyped-def]
+def _angle_bin(y, x):
     """Return floor(11 (atan2(y, x) + pi) / 2 pi)."""
     bin_ = np.int32((atan2(y, x) + np.float32(math.pi)) * np.float32(BINS / (2 * math.pi)))
     return min(max(bin_, 0), BINS - 1)
 
 
 @numba.njit(cache=True, nogil=True, inline='always')
-def _cosine_bin(cosine):  # type: ignore[no-untyped-def]
+def _cosine_bin(cosine):
     """Return floor(11 (cosine + 1) / 2)."""
     return min(max(np.int32((cosine + 1) * np.float32(BINS / 2)), 0), BINS - 1)
 
 
 @numba.njit(cache=True, nogil=True, error_model='numpy',
             fastmath={'nsz', 'arcp', 'contract', 'afn', 'reassoc'})
-def _simple_histograms(first, last, points, normals, start, index,  # type: ignore[no-untyped-def]
+def _simple_histograms(first, last, points, normals, start, index,
                        simple):
     """SPFH of each point: angles of the Darboux frame to every neighbour, 11 bins each."""
     for i in range(np.uint64(first), np.uint64(last)):
@@ -231,7 +231,7 @@ def _simple_histograms(first, last, points, normals, start, index,  # type: igno
 
 
 @numba.njit(cache=True, nogil=True, error_model='numpy', fastmath=True)
-def _weighted_histograms(first, last, simple, start, index, squared,  # type: ignore[no-untyped-def]
+def _weighted_histograms(first, last, simple, start, index, squared,
                          full):
     """FPFH: own SPFH plus those of the neighbours by inverse squared distance."""
     for i in range(np.uint64(first), np.uint64(last)):

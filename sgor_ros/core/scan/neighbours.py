@@ -73,7 +73,7 @@ def radius_neighbours(points: NDArray[np.float64], radius: float) -> Neighbours:
 
 
 @numba.njit(cache=True, nogil=True)
-def _candidates(cells, first, ny, nz):  # type: ignore[no-untyped-def]
+def _candidates(cells, first, ny, nz):
     """Return the pairs of points in cells that touch each other."""
     total = np.int64(0)
     for cell in cells:
@@ -85,7 +85,7 @@ def _candidates(cells, first, ny, nz):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)
-def _count(begin, end, columns, cells, order, first, ny, nz, limit,  # type: ignore[no-untyped-def]
+def _count(begin, end, columns, cells, order, first, ny, nz, limit,
            step, start):
     for at in range(np.uint64(begin), np.uint64(end)):
         x, y, z = columns[:, at]
@@ -107,7 +107,7 @@ def _count(begin, end, columns, cells, order, first, ny, nz, limit,  # type: ign
 
 
 @numba.njit(cache=True, nogil=True)
-def _fill(begin, end, columns, cells, order, first, ny, nz, limit,  # type: ignore[no-untyped-def]
+def _fill(begin, end, columns, cells, order, first, ny, nz, limit,
           step, start, longest, index, squared):
     # room for one candidate more than stay: every candidate is written, without a branch
     near, gap = np.empty(longest + 1, np.uint32), np.empty(longest + 1, np.float32)

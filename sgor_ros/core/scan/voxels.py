@@ -101,7 +101,7 @@ def _columns(labels: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], NDArray[np.i
 
 
 @numba.njit(cache=True, nogil=True)
-def _accumulate(points, columns, voxel_size, shift, n_classes):  # type: ignore[no-untyped-def]
+def _accumulate(points, columns, voxel_size, shift, n_classes):
     """Hash each point to its voxel; sum coordinates and votes."""
     n = len(points)
     n_slots = 1

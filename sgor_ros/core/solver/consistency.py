@@ -83,7 +83,7 @@ def filter_groups(correspondences: Correspondences, graph: ConsistencyGraph, gro
 
 
 @numba.njit(cache=True, nogil=True)
-def _mark_keys(start, index, points, keys, squared_reach, tight,  # type: ignore[no-untyped-def]
+def _mark_keys(start, index, points, keys, squared_reach, tight,
                loose, near, wanted):
     """Set bit g of `near` for what is consistent with key g; of `wanted` if it may be kept.
 

@@ -173,7 +173,7 @@ def _upper(p: NDArray[np.float64], q: NDArray[np.float64], nodes: int, sigma_d: 
 
 
 @numba.njit(cache=True, nogil=True)
-def _mark(first, columns, limit, bits):  # type: ignore[no-untyped-def]
+def _mark(first, columns, limit, bits):
     """Set bit j of the rows from `first` on for each candidate pair i <= j; return how many."""
     found = U64(0)
     for r in range(len(bits)):
@@ -189,7 +189,7 @@ def _mark(first, columns, limit, bits):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)
-def _keep(first, both, bits, sigma_d, reach, length, below, index,  # type: ignore[no-untyped-def]
+def _keep(first, both, bits, sigma_d, reach, length, below, index,
           weight):
     """Write those of the candidates that are within reach, row after row; return how many."""
     n = len(both)
@@ -218,7 +218,7 @@ def _keep(first, both, bits, sigma_d, reach, length, below, index,  # type: igno
 
 
 @numba.njit(cache=True, nogil=True)
-def _fill(first, length, band_index, band_weight, middle, place, index,  # type: ignore[no-untyped-def]
+def _fill(first, length, band_index, band_weight, middle, place, index,
           weight):
     """Write the pairs of a band into the rows i, from their middle on, and into the rows j."""
     e = U64(0)

@@ -46,8 +46,10 @@ def group(correspondences: Correspondences, graph: ConsistencyGraph,
     keys = keys[:max(int(np.searchsorted(visits, MOST_VISITS)), FEWEST_GROUPS)]
     k = min(config.group_size, len(correspondences))
     reach = np.empty(len(keys))
+    # no two are farther apart
+    most = 1e-9 + 1.001 * float((np.ptp(correspondences.source, axis=0)**2).sum())
     shared(_squared_reach, len(keys), np.ascontiguousarray(correspondences.source.T), keys, k,
-           reach)
+           most, reach)
     return Groups(keys, reach)
 
 
@@ -68,7 +70,7 @@ def leading_eigenvector(graph: ConsistencyGraph) -> NDArray[np.float32]:
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True)
-def _multiply(first, last, start, index, weight, vector, product):  # type: ignore[no-untyped-def]
+def _multiply(first, last, start, index, weight, vector, product):
     for i in range(U64(first), U64(last)):
         # four sums, so that an addition need not wait for the one before
         a = b = c = d = np.float32(0.0)
@@ -86,7 +88,7 @@ def _multiply(first, last, start, index, weight, vector, product):  # type: igno
 
 
 @numba.njit(cache=True, nogil=True)
-def _spread(points, order, count, spacing):  # type: ignore[no-untyped-def]
+def _spread(points, order, count, spacing):
     """Take the strongest first, passing over those near a taken one; then fill up with those."""
     taken = np.empty(count, np.uint32)
     passed = np.empty(len(order), np.uint32)
@@ -115,13 +117,10 @@ def _spread(points, order, count, spacing):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)
-def _squared_reach(first, last, columns, keys, k, reach):  # type: ignore[no-untyped-def]
+def _squared_reach(first, last, columns, keys, k, most, reach):
     """Write how far the k nearest of each key reach: for large k faster than a tree."""
     n = columns.shape[1]
     squared = np.empty(n)
-    most = 1e-9
-    for a in range(3):
-        most += 1.001 * (columns[a].max() - columns[a].min())**2
     for g in range(U64(first), U64(last)):
         x, y, z = columns[:, keys[g]]
         for i in range(n):
@@ -130,13 +129,13 @@ def _squared_reach(first, last, columns, keys, k, reach):  # type: ignore[no-unt
 
 
 @numba.njit(cache=True, nogil=True, inline='always')
-def squared_distance(ax, ay, az, bx, by, bz):  # type: ignore[no-untyped-def]
+def squared_distance(ax, ay, az, bx, by, bz):
     """Return the squared distance of two points; whoever asks for members rounds alike."""
     return (ax - bx) * (ax - bx) + (ay - by) * (ay - by) + (az - bz) * (az - bz)
 
 
 @numba.njit(cache=True, nogil=True)
-def _bound_of_nearest(squared, k, most):  # type: ignore[no-untyped-def]
+def _bound_of_nearest(squared, k, most):
     """Narrow the range up to `most` until k values are within; vectors count fast."""
     low, high = 0.0, most
     below, within = _count_within(squared, low), len(squared)
@@ -162,7 +161,7 @@ def _bound_of_nearest(squared, k, most):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)
-def _count_within(values, bound):  # type: ignore[no-untyped-def]
+def _count_within(values, bound):
     count = 0
     for i in range(len(values)):
         count += values[i] <= bound

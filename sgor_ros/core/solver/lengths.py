@@ -37,7 +37,7 @@ def prefilter_limit(reach: float) -> np.float32:
 
 
 @numba.njit(cache=True, nogil=True)
-def mark_row(columns, from_word, px, py, pz, qx, qy, qz, limit, row):  # type: ignore[no-untyped-def]
+def mark_row(columns, from_word, px, py, pz, qx, qy, qz, limit, row):
     """Set bit j of a row where the lengths to j may differ by the reach, from a word on."""
     ax, ay, az = columns[0], columns[1], columns[2]
     bx, by, bz = columns[3], columns[4], columns[5]
@@ -56,7 +56,7 @@ def mark_row(columns, from_word, px, py, pz, qx, qy, qz, limit, row):  # type: i
 
 
 @numba.njit(cache=True, nogil=True)
-def places_of_bits(row, from_word, places):  # type: ignore[no-untyped-def]
+def places_of_bits(row, from_word, places):
     """Write the places of all bits that are set, from a word on; return how many."""
     found = U64(0)
     for w in range(U64(from_word), U64(len(row))):
@@ -69,7 +69,7 @@ def places_of_bits(row, from_word, places):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True, error_model='numpy', fastmath={'contract'})
-def weigh(both, places, count, px, py, pz, qx, qy, qz, sigma_d,  # type: ignore[no-untyped-def]
+def weigh(both, places, count, px, py, pz, qx, qy, qz, sigma_d,
           reach, squared, other, weight):
     """Write d_ij^2 (Eq. 5) from one match to the first `count` of some places, and W_m (Eq. 8)."""
     for k in range(U64(count)):

@@ -110,7 +110,7 @@ def choose(graph: ConsistencyGraph, block: Block, support: NDArray[np.float32],
 
 
 @numba.njit(cache=True, nogil=True)
-def _asking(start, index, wanted, b):  # type: ignore[no-untyped-def]
+def _asking(start, index, wanted, b):
     """Return the keys for which a row that they may keep has a one at b."""
     keys = U64(0)
     for e in range(start[b], start[b + U64(1)]):
@@ -119,7 +119,7 @@ def _asking(start, index, wanted, b):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)
-def _scatter(first, last, start, index, far_start, far_index, weight,  # type: ignore[no-untyped-def]
+def _scatter(first, last, start, index, far_start, far_index, weight,
              keys, support):
     """Write the support of each key from the rows that are near it: faster where keys have few."""
     for g in range(U64(first), U64(last)):
@@ -132,7 +132,7 @@ def _scatter(first, last, start, index, far_start, far_index, weight,  # type: i
 
 
 @numba.njit(cache=True, nogil=True)
-def _support(first, last, start, index, weight, near, support):  # type: ignore[no-untyped-def]
+def _support(first, last, start, index, weight, near, support):
     """Write sixteen columns a task, from the rows of the graph."""
     n = U64(len(start)) - U64(1)
     square = np.zeros((16, BLOCK), np.float32)
@@ -144,7 +144,7 @@ def _support(first, last, start, index, weight, near, support):  # type: ignore[
 
 
 @numba.njit(cache=True, nogil=True)
-def _support_afar(first, last, start, index, both, some, columns,  # type: ignore[no-untyped-def]
+def _support_afar(first, last, start, index, both, some, columns,
                   limit, sigma_d, reach, near, wanted, support):
     """Write sixteen columns a task, from all that is near a key (`some`, and `near` of it)."""
     square = np.zeros((16, BLOCK), np.float32)
@@ -170,7 +170,7 @@ def _support_afar(first, last, start, index, both, some, columns,  # type: ignor
 
 
 @numba.njit(cache=True, nogil=True)
-def _add(near, places, weights, count, sums):  # type: ignore[no-untyped-def]
+def _add(near, places, weights, count, sums):
     """Write the sum of the weights at places for each key that these are near."""
     one = two = three = four = splat(np.float32(0.0))
     for k in range(U64(count)):
@@ -186,7 +186,7 @@ def _add(near, places, weights, count, sums):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)
-def _transpose(square, at, support):  # type: ignore[no-untyped-def]
+def _transpose(square, at, support):
     """Write sixteen columns at once: one by one each element would touch a line of the cache."""
     for g in range(U64(BLOCK)):
         for c in range(U64(16)):
@@ -194,7 +194,7 @@ def _transpose(square, at, support):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)
-def _mark_rows(first, last, start, index, rows, bits):  # type: ignore[no-untyped-def]
+def _mark_rows(first, last, start, index, rows, bits):
     """Write rows of M' as bits."""
     for r in range(U64(first), U64(last)):
         row = bits[r]
@@ -205,7 +205,7 @@ def _mark_rows(first, last, start, index, rows, bits):  # type: ignore[no-untype
 
 
 @numba.njit(cache=True, nogil=True)
-def _choose(first, last, support, rows, wanted, bits, places, kept,  # type: ignore[no-untyped-def]
+def _choose(first, last, support, rows, wanted, bits, places, kept,
             scores):
     own = np.empty(len(rows) + 4, np.uint32)
     for g in range(U64(first), U64(last)):
@@ -237,7 +237,7 @@ def _choose(first, last, support, rows, wanted, bits, places, kept,  # type: ign
 
 
 @numba.njit(cache=True, nogil=True)
-def _insert(score, item, scores, items):  # type: ignore[no-untyped-def]
+def _insert(score, item, scores, items):
     """Put an item into its place among the best; the worst drops out."""
     at = len(scores) - 1
     if score <= scores[at]:

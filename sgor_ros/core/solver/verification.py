@@ -97,7 +97,7 @@ def near_counts(T: NDArray[np.float64], source: NDArray[np.float64], target: NDA
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True)
-def _squared_distances(T, source, target, squared):  # type: ignore[no-untyped-def]
+def _squared_distances(T, source, target, squared):
     """Write how far each match lies apart, squared; (3, N) columns, so that there are vectors."""
     # all out of the loop: what is written might be a part of it
     (a, b, c, x0), (d, e, f, y0), (g, h, k, z0) = T[0], T[1], T[2]
@@ -111,7 +111,7 @@ def _squared_distances(T, source, target, squared):  # type: ignore[no-untyped-d
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True)
-def _truncated_distance(first, last, T, source, target, sigma_d,  # type: ignore[no-untyped-def]
+def _truncated_distance(first, last, T, source, target, sigma_d,
                         cost):
     squared = np.empty(source.shape[1])
     for h in range(first, last):
@@ -123,7 +123,7 @@ def _truncated_distance(first, last, T, source, target, sigma_d,  # type: ignore
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True)
-def _near_counts(first, last, T, source, target, reach, counts):  # type: ignore[no-untyped-def]
+def _near_counts(first, last, T, source, target, reach, counts):
     squared = np.empty(source.shape[1])
     for h in range(first, last):
         _squared_distances(T[h], source, target, squared)

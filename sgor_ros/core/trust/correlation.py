@@ -64,7 +64,7 @@ def _quarter(turn: int) -> NDArray[np.float64]:
 
 
 @numba.njit(cache=True, nogil=True)
-def _sweep(begin, end, columns, bits, cells, half, hits):  # type: ignore[no-untyped-def]
+def _sweep(begin, end, columns, bits, cells, half, hits):
     """Count for each turn and shift, by two cells each, the points whose bit is in their cell."""
     size, width = cells.shape[1], 2 * half + 1
     for task in range(begin, end):
@@ -85,18 +85,14 @@ def _sweep(begin, end, columns, bits, cells, half, hits):  # type: ignore[no-unt
                 row[first + j] += np.int32((run[j] & bit) != 0)
 
 
-@numba.njit(cache=True, nogil=True)
-def _peaks(hits, most):  # type: ignore[no-untyped-def]
+def _peaks(hits: NDArray[np.int32], most: int) -> list[tuple[int, int, int]]:
     """Return the `most` highest (turn, i, j) of each turn, none next to a higher; spoils hits."""
-    peaks = np.empty((len(hits) * most, 3), np.int64)
-    count = 0
+    peaks = []
     for turn in range(len(hits)):
         for _ in range(most):
-            at = np.argmax(hits[turn])
-            i, j = at // hits.shape[2], at % hits.shape[2]
+            i, j = divmod(int(hits[turn].argmax()), hits.shape[2])
             if hits[turn, i, j] == 0:
                 break
-            peaks[count] = (turn, i, j)
-            count += 1
+            peaks.append((turn, i, j))
             hits[turn, max(0, i - 1):i + 2, max(0, j - 1):j + 2] = 0
-    return peaks[:count]
+    return peaks

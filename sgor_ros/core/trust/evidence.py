@@ -106,14 +106,14 @@ def _ask(source: View, target: View, T: NDArray[np.float64], sample: int, *, rou
     # roughly, whatever is in the cells around is a partner
     reach, near, margin = ((target.cell, target.cell, target.cell) if rough else
                            (target.reach, ON_SURFACE * target.reach, MARGIN * target.reach))
-    shared(_outcomes, outcomes.size, source.points[rows], source.labels[rows], T, target.points,
-           target.normals, target.labels, target.cell, target.slots, target.chain,
-           target.nearest, reach, near * near, margin, outcomes)
+    shared(_outcomes, outcomes.size, source.points[rows], source.labels[rows],
+           np.ascontiguousarray(T), target.points, target.normals, target.labels, target.cell,
+           target.slots, target.chain, target.nearest, reach, near * near, margin, outcomes)
     return outcomes
 
 
 @numba.njit(cache=True, nogil=True)
-def _outcomes(first, last, points, labels, T, others, normals,  # type: ignore[no-untyped-def]
+def _outcomes(first, last, points, labels, T, others, normals,
               other_labels, cell, slots, chain, nearest, reach, limit, margin, outcomes):
     for task in range(first, last):
         h, i = task // len(points), task % len(points)
@@ -136,7 +136,7 @@ def _outcomes(first, last, points, labels, T, others, normals,  # type: ignore[n
 
 
 @numba.njit(cache=True, nogil=True)
-def _on_surface(x, y, z, label, others, normals, other_labels, cell,  # type: ignore[no-untyped-def]
+def _on_surface(x, y, z, label, others, normals, other_labels, cell,
                 slots, chain, reach, limit):
     """Return whether a surface of the same label is near, by `gap` below `limit`."""
     low, high, shift = cells_around(reach, cell)
@@ -157,20 +157,20 @@ def _on_surface(x, y, z, label, others, normals, other_labels, cell,  # type: ig
 
 
 @numba.njit(cache=True, nogil=True, inline='always')
-def alike(one, other):  # type: ignore[no-untyped-def]
+def alike(one, other):
     """Return whether two regional labels may be of one thing; the unlabelled may be anything."""
     return one == other or min(one, other) == UNLABELLED
 
 
 @numba.njit(cache=True, nogil=True, inline='always')
-def gap(a, b, c, squared, normal):  # type: ignore[no-untyped-def]
+def gap(a, b, c, squared, normal):
     """Return the squared distance to a surface: full across it, a share of it along it."""
     across = a * normal[0] + b * normal[1] + c * normal[2]
     return across * across * (1 - TANGENTIAL) + TANGENTIAL * squared
 
 
 @numba.njit(cache=True, nogil=True, inline='always')
-def cells_around(reach, cell):  # type: ignore[no-untyped-def]
+def cells_around(reach, cell):
     """Return the range of cells a ball can touch, and the shift that makes them so few.
 
     Eight for a ball of up to half a cell, 27 for a larger one.

@@ -43,7 +43,7 @@ def icp(source: View, target: View, T_target_source: NDArray[np.float64], wide: 
     (H, 4, 4) float64
     """
     rows = thin(len(source.points), sample)
-    T = np.array(T_target_source)
+    T = np.array(T_target_source, order='C')
     shared(_icp, len(T), source.points[rows], source.labels[rows], T, target.points,
            target.normals, target.labels, target.cell, target.slots, target.chain, target.reach,
            wide, narrow)
@@ -62,17 +62,16 @@ def partners(source: View, target: View, T_target_source: NDArray[np.float64], s
 
 
 @numba.njit(cache=True, nogil=True)
-def _partners(placed, labels, others, normals, other_labels, cell,  # type: ignore[no-untyped-def]
+def _partners(placed, labels, others, normals, other_labels, cell,
               slots, chain, reach, limit, found):
     for i in range(len(placed)):
-        x, y, z = placed[i]
-        at, best = _nearest(x, y, z, labels[i], others, normals, other_labels, cell, slots, chain,
-                            reach)
+        at, best = _nearest(placed[i, 0], placed[i, 1], placed[i, 2], labels[i], others,
+                            normals, other_labels, cell, slots, chain, reach)
         found[i] = at if best <= limit else -1
 
 
 @numba.njit(cache=True, nogil=True)
-def _nearest(x, y, z, label, others, normals, other_labels, cell,  # type: ignore[no-untyped-def]
+def _nearest(x, y, z, label, others, normals, other_labels, cell,
              slots, chain, reach):
     """Return the partner with the smallest gap, -1 without any, and that gap, m^2."""
     best, at = np.inf, -1
@@ -95,17 +94,21 @@ def _nearest(x, y, z, label, others, normals, other_labels, cell,  # type: ignor
     return at, best
 
 
-@numba.njit(cache=True, nogil=True)
-def _icp(first, last, points, labels, T, others, normals, other_labels,  # type: ignore[no-untyped-def]
+@numba.njit(cache=True, nogil=True, error_model='numpy')
+def _icp(first, last, points, labels, T, others, normals, other_labels,
          cell, slots, chain, reach, wide, narrow):
+    H, g = np.empty((6, 6), np.float64), np.empty(6, np.float64)
+    # normal, and the three axes: of translation and rotation; and the error along each
+    rows = np.zeros((4, 7), np.float64)
+    rows[1, 0] = rows[2, 1] = rows[3, 2] = 1.0
     for h in range(first, last):
-        rows = np.zeros((4, 6))    # normal, and the three axes: of translation and rotation
         for turn in range(wide + narrow):
             far = 2 * reach if turn < wide else reach
-            H, g = np.zeros((6, 6)), np.zeros(6)
+            H[:] = 0.0
+            g[:] = 0.0
             partners = 0
             for i in range(len(points)):
-                px, py, pz = points[i]
+                px, py, pz = points[i, 0], points[i, 1], points[i, 2]
                 lx = T[h, 0, 0] * px + T[h, 0, 1] * py + T[h, 0, 2] * pz
                 ly = T[h, 1, 0] * px + T[h, 1, 1] * py + T[h, 1, 2] * pz
                 lz = T[h, 2, 0] * px + T[h, 2, 1] * py + T[h, 2, 2] * pz
@@ -115,36 +118,60 @@ def _icp(first, last, points, labels, T, others, normals, other_labels,  # type:
                 if at < 0:
                     continue
                 partners += 1
-                nx, ny, nz = normals[at]
+                nx, ny, nz = normals[at, 0], normals[at, 1], normals[at, 2]
                 ex, ey, ez = x - others[at, 0], y - others[at, 1], z - others[at, 2]
                 pull = 1 / (1 + found / (SOFTNESS * far)**2)**2
-                rows[0] = (nx, ny, nz, ly * nz - lz * ny, lz * nx - lx * nz, lx * ny - ly * nx)
-                rows[1] = (1.0, 0.0, 0.0, 0.0, lz, -ly)
-                rows[2] = (0.0, 1.0, 0.0, -lz, 0.0, lx)
-                rows[3] = (0.0, 0.0, 1.0, ly, -lx, 0.0)
-                for r, error in enumerate((ex * nx + ey * ny + ez * nz, ex, ey, ez)):
+                rows[0, 0], rows[0, 1], rows[0, 2] = nx, ny, nz
+                rows[0, 3], rows[0, 4] = ly * nz - lz * ny, lz * nx - lx * nz
+                rows[0, 5], rows[0, 6] = lx * ny - ly * nx, ex * nx + ey * ny + ez * nz
+                rows[1, 4], rows[1, 5], rows[1, 6] = lz, -ly, ex
+                rows[2, 3], rows[2, 5], rows[2, 6] = -lz, lx, ey
+                rows[3, 3], rows[3, 4], rows[3, 6] = ly, -lx, ez
+                for r in range(4):
                     weight = pull * (1 - TANGENTIAL if r == 0 else TANGENTIAL)
                     for a in range(6):
-                        g[a] += weight * rows[r, a] * error
+                        g[a] += weight * rows[r, a] * rows[r, 6]
                         for b in range(a + 1):
                             H[a, b] += weight * rows[r, a] * rows[r, b]
             if partners < FEWEST_PARTNERS:
                 break
             for a in range(6):
                 H[a, a] += 1e-6 * partners    # points on a line leave a turn about it free
-                for b in range(a):
-                    H[b, a] = H[a, b]
-            step = -np.linalg.solve(H, g)
-            _turn(T[h], step)
+            _solve(H, g)
+            _turn(T[h], g)
 
 
-@numba.njit(cache=True, nogil=True)
-def _turn(T, step):  # type: ignore[no-untyped-def]
-    """Move a placement by (translation, rotation about its own origin), in the target frame."""
-    angle = math.sqrt(step[3]**2 + step[4]**2 + step[5]**2)
+@numba.njit(cache=True, nogil=True, error_model='numpy')
+def _solve(H, g):
+    """Replace g by the solution of H x = g, H positive definite and given below its diagonal.
+
+    By hand, like `_turn`: numpy's functions take numba seconds to compile.
+    """
+    for k in range(len(g)):
+        for a in range(k + 1, len(g)):
+            share = H[a, k] / H[k, k]
+            g[a] -= share * g[k]
+            for b in range(k + 1, a + 1):
+                H[a, b] -= share * H[b, k]
+    for k in range(len(g) - 1, -1, -1):
+        for a in range(k + 1, len(g)):
+            g[k] -= H[a, k] * g[a]
+        g[k] /= H[k, k]
+
+
+@numba.njit(cache=True, nogil=True, error_model='numpy')
+def _turn(T, back):
+    """Move a placement back by (translation, rotation about its own origin), target frame."""
+    angle = math.sqrt(back[3] * back[3] + back[4] * back[4] + back[5] * back[5])
     if angle > 0:
-        x, y, z = step[3:] / angle
-        K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-        R = np.eye(3) + math.sin(angle) * K + (1 - math.cos(angle)) * (K @ K)
-        T[:3, :3] = R @ np.ascontiguousarray(T[:3, :3])
-    T[:3, 3] += step[:3]
+        kx, ky, kz = -back[3] / angle, -back[4] / angle, -back[5] / angle
+        sine, rest = math.sin(angle), 1 - math.cos(angle)
+        for c in range(3):    # Rodrigues
+            x, y, z = T[0, c], T[1, c], T[2, c]
+            ux, uy, uz = ky * z - kz * y, kz * x - kx * z, kx * y - ky * x
+            T[0, c] += sine * ux + rest * (ky * uz - kz * uy)
+            T[1, c] += sine * uy + rest * (kz * ux - kx * uz)
+            T[2, c] += sine * uz + rest * (kx * uy - ky * ux)
+    T[0, 3] -= back[0]
+    T[1, 3] -= back[1]
+    T[2, 3] -= back[2]

@@ -112,7 +112,7 @@ def _overhead(placed: NDArray[np.float64], facing: NDArray[np.float64],
     for aside in (1, -1):
         # a normal is good to some ten degrees, so the next sectors count too
         bits |= map_bits(kinds, np.where(sectors < SECTORS, (sectors + aside) % SECTORS, sectors))
-    _mark(columns[:, 0], columns[:, 1], bits, cells)
+    _mark(columns, bits, cells)
     return OverheadMap(cells, edge, -half * edge)
 
 
@@ -135,20 +135,22 @@ def map_bits(kinds: NDArray[np.int64], sectors: NDArray[np.int64]) -> NDArray[np
 
 
 @numba.njit(cache=True, nogil=True)
-def _mark(x, y, bits, cells):  # type: ignore[no-untyped-def]
-    for i in range(len(x)):
-        cells[x[i] - 1:x[i] + 2, y[i] - 1:y[i] + 2] |= bits[i]
+def _mark(columns, bits, cells):
+    for i in range(len(bits)):
+        for x in range(columns[i, 0] - 1, columns[i, 0] + 2):
+            for y in range(columns[i, 1] - 1, columns[i, 1] + 2):
+                cells[x, y] |= bits[i]
 
 
 @numba.njit(cache=True, nogil=True, inline='always')
-def slot_of(x, y, z, mask):  # type: ignore[no-untyped-def]
+def slot_of(x, y, z, mask):
     """Return where in the hash a cell begins."""
     key = x * np.int64(73856093) ^ y * np.int64(19349663) ^ z * np.int64(83492791)
     return (key ^ (key >> 15)) & mask
 
 
 @numba.njit(cache=True, nogil=True)
-def _hash_points(points, cell):  # type: ignore[no-untyped-def]
+def _hash_points(points, cell):
     size = 1024
     while size < 2 * len(points):
         size *= 2
@@ -164,7 +166,7 @@ def _hash_points(points, cell):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True, inline='always')
-def direction(x, y, z):  # type: ignore[no-untyped-def]
+def direction(x, y, z):
     """Return the cell of the range image that a point is seen in."""
     azimuth = int((atan2(y, x) / (2 * math.pi) + 0.5) * AZIMUTHS)
     elevation = int((atan2(z, math.sqrt(x * x + y * y)) / math.pi + 0.5) * ELEVATIONS)
@@ -172,7 +174,7 @@ def direction(x, y, z):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)
-def _range_image(points):  # type: ignore[no-untyped-def]
+def _range_image(points):
     nearest = np.full((AZIMUTHS, ELEVATIONS), np.inf, np.float32)
     for i in range(len(points)):
         x, y, z = points[i]

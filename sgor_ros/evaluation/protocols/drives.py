@@ -6,6 +6,7 @@ from ...core.config import SgorConfig
 from ...io.datasets import Drive
 from ..pairs import BAND_M
 from ..pairs import near_pairs
+from ..pairs import Pair
 from .kitti import INLIER_M
 from .task import EASY
 from .task import HARD
@@ -14,12 +15,14 @@ from .task import Protocol
 from .task import Task
 
 
-def posed(drives: Sequence[Drive], max_distance_m: float, name: str = 'poses') -> Protocol:
-    """Return all pairs of scans of a drive up to a distance, in bands of 10 m."""
+def posed(drives: Sequence[Drive], max_distance_m: float, listed: Sequence[Pair] = ()
+          ) -> Protocol:
+    """Return all pairs of scans of a drive up to a distance, and listed ones, in bands of 10 m."""
     tasks = [Task(f'{pair.source.name} {pair.target.name}', _band(pair.distance_m), pair.source,
                   pair.target, pair.T_target_source)
-             for pair in near_pairs(drives, max_distance_m) if pair.T_target_source is not None]
-    return Protocol(name, tasks, (EASY, MEDIUM, HARD), INLIER_M, SgorConfig.kitti_protocol())
+             for pair in [*near_pairs(drives, max_distance_m), *listed]
+             if pair.T_target_source is not None]
+    return Protocol('poses', tasks, (EASY, MEDIUM, HARD), INLIER_M, SgorConfig.kitti_protocol())
 
 
 def strided(drives: Sequence[Drive], strides: Sequence[int]) -> Protocol:

@@ -72,14 +72,17 @@ def shared_matches(task: Task, config: SgorConfig, inlier_m: float, variant: Var
                    features: Features | None = None) -> Matches:
     """Return what every method of a table gets for a pair."""
     rng = np.random.default_rng([variant.seed, *task.name.encode()])
+    if task.matches is not None:
+        found = _thinned(task.matches.correspondences, variant.matches, rng)
+        return replace(task.matches, correspondences=found)
+    assert task.source is not None
+    assert task.target is not None
     source, target = (_prepared(frame, config, variant, rng, features)
                       for frame in (task.source, task.target))
     p, q = source.features, target.features
     if config.correspondence_preprocessing and config.semantics != 'none':
         p, q = overlap_region(p, q)
-    found = match(p, q, config)
-    if 0 < variant.matches < len(found):
-        found = _rows(found, np.sort(rng.permutation(len(found))[:variant.matches]))
+    found = _thinned(match(p, q, config), variant.matches, rng)
     normals = (None if source.ground is None or target.ground is None
                else (source.ground.normal, target.ground.normal))
     return Matches(found, inlier_m, normals)
@@ -113,6 +116,9 @@ def with_categories(labels: NDArray[np.int64], convention: str, count: int
     return np.where(np.isin(classes, kept), labels, no_label)
 
 
-def _rows(found: Correspondences, rows: NDArray[np.intp]) -> Correspondences:
+def _thinned(found: Correspondences, count: int, rng: np.random.Generator) -> Correspondences:
+    if not 0 < count < len(found):
+        return found
+    rows = np.sort(rng.permutation(len(found))[:count])
     return replace(found, **{name: getattr(found, name)[rows]
                              for name in found.__dataclass_fields__})

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from ...core.config import SgorConfig
 from ...io.datasets import Frame
+from ..methods import Matches
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,16 +20,19 @@ class Task:
         Its own within the protocol.
     group : str
         What it is counted under: a band of distance, a scene.
-    source, target : Frame
+    source, target : Frame or None
     T_target_source : (4, 4) float64
         The truth.
+    matches : Matches or None
+        Where they come from a file, in place of scans.
     """
 
     name: str
     group: str
-    source: Frame
-    target: Frame
+    source: Frame | None
+    target: Frame | None
     T_target_source: NDArray[np.float64]
+    matches: Matches | None = None
 
 
 @dataclass(frozen=True)

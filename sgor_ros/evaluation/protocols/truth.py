@@ -50,6 +50,8 @@ def _read(cache: Path) -> dict[str, Any]:
 def _icp(task: Task) -> Array:
     import open3d as o3d
     registration = o3d.pipelines.registration
+    assert task.source is not None
+    assert task.target is not None
     source, target = (o3d.geometry.PointCloud(o3d.utility.Vector3dVector(
         frame.read().points.astype(np.float64))).voxel_down_sample(VOXEL_M)
         for frame in (task.source, task.target))

@@ -1,0 +1,138 @@
+"""What all commands have in common: help, version, exit codes, and words in time."""
+from importlib import import_module
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+from sgor_ros import warm_up
+from sgor_ros.commands.frame import CODES
+
+MODULES = {'sgor_register': 'commands.register', 'sgor_replay': 'commands.replay',
+           'sgor_kitti_to_bag': 'commands.kitti_to_bag', 'sgor_benchmark': 'commands.benchmark',
+           'sgor_demo': 'commands.demo', 'sgor_tables': 'commands.tables', 'sgor_node': 'ros.node'}
+COMMANDS = [(name,) for name in MODULES if name != 'sgor_node'] + [
+    ('sgor_benchmark', kind) for kind in ('pairs', 'wrong', 'ablation', 'sequence', 'solver')]
+WITHOUT_ROS = 'import sys; sys.modules["rclpy"] = None; from sgor_ros.{} import main; ' \
+    'sys.exit(main())'
+
+
+def line(name, *arguments):
+    return [sys.executable, '-m', f'sgor_ros.{MODULES[name]}', *map(str, arguments)]
+
+
+def ran(*command, **options):
+    return subprocess.run(command, capture_output=True, text=True, check=False, **options)
+
+
+@pytest.fixture(scope='module')
+def pair(street, tmp_path_factory):
+    # so that commands say nothing of compiling
+    warm_up()
+    folder = tmp_path_factory.mktemp('pair')
+    for name, (points, labels, _) in (('source', street[1]), ('target', street[0])):
+        np.savez(folder / f'{name}.npz', points=points, labels=labels)
+    return folder / 'source.npz', folder / 'target.npz'
+
+
+def ended(name, *arguments):
+    """Run a command here, which is quicker, and return the code that it ends with."""
+    with pytest.raises(SystemExit) as end:
+        import_module(f'sgor_ros.{MODULES[name]}').main(list(arguments))
+    return end.value.code
+
+
+@pytest.mark.parametrize('command', COMMANDS, ids=' '.join)
+def test_help_and_version(command, capsys):
+    assert ended(*command, '--help') == 0
+    said = capsys.readouterr().out
+    assert said.startswith(f'usage: {" ".join(command)} ')
+    assert 'default: None' not in said
+    assert 'default: False' not in said
+    assert f'examples:\n  {command[0]}' in said
+    codes = said.partition('exit codes:')[2]
+    assert all(f'  {int(code):<4} {meaning}' in codes for code, meaning in CODES.items())
+    assert ended(*command, '--version') == 0
+    assert capsys.readouterr().out.startswith('sgor_ros 0.')
+
+
+def test_defaults_that_say_something_are_told(capsys):
+    ended('sgor_benchmark', 'solver', '--help')
+    said = ' '.join(capsys.readouterr().out.split())
+    assert 'chooses pairs, turns and noise (default: 0)' in said
+    assert 'of made-up matches (default: 0.02)' in said
+
+
+@pytest.mark.parametrize('command', COMMANDS, ids=' '.join)
+def test_a_slip_is_answered_in_two_lines(command, capsys):
+    assert ended(*command, '--nonsense') == 2
+    first, second = capsys.readouterr().err.splitlines()
+    assert first.startswith('error: ')
+    assert second.startswith(f'usage: {command[0]} ')
+    assert '--help' in second
+
+
+@pytest.mark.parametrize('module', ['ros.node', 'commands.demo'])
+def test_without_ros(module):
+    for option in ('--help', '--version'):
+        said = ran(sys.executable, '-c', WITHOUT_ROS.format(module), option)
+        assert (said.returncode, said.stderr) == (0, '')
+        assert 'sgor_' in said.stdout
+    said = ran(sys.executable, '-c', WITHOUT_ROS.format(module))
+    assert said.returncode == 2
+    assert said.stderr.startswith('error: no ROS 2 here')
+    assert len(said.stderr.splitlines()) == 1
+
+
+def test_a_reader_that_has_had_enough(pair):
+    with subprocess.Popen(line('sgor_register', *pair), stdout=subprocess.PIPE,
+                          stderr=subprocess.PIPE) as process:
+        process.stdout.close()
+        assert process.wait(400) == 141
+        assert process.stderr.read() == b''
+
+
+def test_a_screen_that_cannot_be_written(pair):
+    with open('/dev/full', 'w') as full:
+        said = subprocess.run(line('sgor_register', *pair), stdout=full, stderr=subprocess.PIPE,
+                              text=True, check=False)
+    assert said.returncode == 3
+    assert said.stderr == 'error: [Errno 28] No space left on device\n'
+
+
+def test_a_fault_of_the_program_is_no_result(pair):
+    code = ('import sys; from sgor_ros.commands import register;'
+            'register.register = lambda *_: 1 / 0; sys.exit(register.main())')
+    said = ran(sys.executable, '-c', code, *map(str, pair))
+    assert said.returncode == 3
+    assert 'ZeroDivisionError' in said.stderr
+    assert said.stderr.splitlines()[-1].startswith('error: a fault of the program')
+
+
+@pytest.mark.parametrize('name', ['sgor_register', 'sgor_replay', 'sgor_benchmark', 'library'])
+def test_compiling_is_said_when_it_begins(name, pair, street_bag, tmp_path):
+    """On a machine where nothing is compiled yet; then it is told to end, and does."""
+    command = {'sgor_register': ('sgor_register', *pair),
+               'sgor_replay': ('sgor_replay', street_bag, '--output', tmp_path / 'out'),
+               'sgor_benchmark': ('sgor_benchmark', 'pairs', '--output', tmp_path / 'out')}
+    process = subprocess.Popen(
+        line(*command[name]) if name in command else [
+            sys.executable, '-c', 'import sgor_ros, numpy as np; x = sgor_ros.SemanticScan('
+            'np.random.default_rng(0).normal(0, 9, (5000, 3))); sgor_ros.register(x, x)'],
+        env={**os.environ, 'NUMBA_CACHE_DIR': str(tmp_path / 'cache')},
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    try:
+        assert process.stderr.readline().startswith('compiling for this machine')
+        assert process.poll() is None
+        time.sleep(0.5)
+        process.send_signal(signal.SIGTERM)
+        said = process.communicate(timeout=60)[1]
+    finally:
+        process.kill()
+    assert process.returncode == (143 if name in command else -signal.SIGTERM), said
+    assert not list(tmp_path.glob('out*'))
+    assert 'Traceback' not in said
