@@ -363,12 +363,24 @@ def test_sequence_command_through_places(tmp_path):
     assert 'tunnel: SGOR, keyframe, no labels | 4 | 0%' in table
 
 
-def test_solver_command(tmp_path):
+def test_solver_command(sequences_folder, tmp_path):
+    """Made-up matches and those of scans, by all solvers; they find what is true."""
     out = tmp_path / 'out'
     assert main(['solver', '--counts', '400', '1000', '--inlier-share', '0.1', '--runs', '2',
-                 '--dense-limit', '400', '--output', str(out)]) == 0
+                 '--dense-limit', '400', '--data', str(sequences_folder), '--pairs', '2',
+                 '--fpfh-matches', '1500', '--output', str(out)]) == 0
     rows = rows_of(out)
-    assert all(float(r['translation_error_m']) < 0.3 for r in rows)
+    assert len({r['matches'] for r in rows}) == 3
+    for r in rows:
+        made_up = r['matches'] == 'made up'
+        assert int(r['count']) in ((400, 1000) if made_up else (1500,))
+        assert float(r['inlier_share']) == pytest.approx(0.1, abs=0.002) or not made_up
+        assert 0 < float(r['consistent_share']) < 0.2
+        assert 0 < float(r['cpu_seconds'])
+        if r['solver'].startswith('SGOR'):
+            assert float(r['translation_error_m']) < 0.3
+    assert {r['solver'] for r in rows} >= {
+        'SGOR', 'SGOR, one thread', "SGOR, paper's settings, one thread"}
     dense, sparse = (next(r for r in rows if r['solver'].startswith(name))
                      for name in ('dense numpy', 'SGOR, 20 groups'))
     assert float(dense['translation_error_m']) == pytest.approx(
@@ -380,7 +392,7 @@ def test_solver_command(tmp_path):
     (['pairs', '--data', '{data}', '--methods', 'icp'], '--methods icp: not one of sgor, paper'),
     (['pairs', '--data', '{data}', '--max-distance', '0.1'], 'no pairs within 0.1 m'),
     (['wrong', '--data', '{data}/sequences/01'], 'no wrong pairs'),
-    (['solver', '--data', 'nope'], '--data nope: no correspondences/'),
+    (['solver', '--data', 'nope'], 'nope: no such file or folder'),
     (['solver', '--output', '{data}'], 'exists already'),
 ])
 def test_unusable_input_is_told_in_one_line(arguments, message, sequences_folder, capsys,

@@ -1,4 +1,6 @@
 """What all commands have in common: help, version, exit codes, and words in time."""
+from argparse import Namespace
+from contextlib import suppress
 from importlib import import_module
 import os
 import signal
@@ -10,7 +12,9 @@ import numpy as np
 import pytest
 
 from sgor_ros import warm_up
+from sgor_ros.commands.frame import AGAIN_S
 from sgor_ros.commands.frame import CODES
+from sgor_ros.commands.frame import run
 
 MODULES = {'sgor_register': 'commands.register', 'sgor_replay': 'commands.replay',
            'sgor_kitti_to_bag': 'commands.kitti_to_bag', 'sgor_benchmark': 'commands.benchmark',
@@ -111,6 +115,32 @@ def test_a_fault_of_the_program_is_no_result(pair):
     assert said.returncode == 3
     assert 'ZeroDivisionError' in said.stderr
     assert said.stderr.splitlines()[-1].startswith('error: a fault of the program')
+
+
+@pytest.mark.parametrize('number', [signal.SIGTERM, signal.SIGINT])
+def test_a_signal_that_is_lost_comes_again_and_lets_the_command_clear_away(number):
+    cleared = []
+
+    def command(_):
+        try:
+            with suppress(BaseException):    # as a callback from C code does
+                signal.raise_signal(number)
+            time.sleep(60)
+        finally:
+            try:
+                raise OSError
+            except OSError:
+                time.sleep(5 * AGAIN_S)
+                cleared.append(True)
+        return 0
+
+    before = signal.getsignal(number)
+    begin = time.monotonic()
+    assert run(command, Namespace()) == 128 + number
+    assert cleared == [True]
+    assert time.monotonic() - begin < 30
+    assert signal.getsignal(number) is before
+    assert signal.getitimer(signal.ITIMER_REAL) == (0.0, 0.0)
 
 
 @pytest.mark.parametrize('name', ['sgor_register', 'sgor_replay', 'sgor_benchmark', 'library'])

@@ -1,4 +1,6 @@
 """The sparse compiled path against the dense reference of the paper's equations."""
+import tracemalloc
+
 import dense_reference as dense
 import numpy as np
 import pytest
@@ -41,12 +43,13 @@ def real_matches(folder, name):
 
 
 def dense_graph(graph):
-    """Return the consistent part and all weights of a sparse graph as (N, N) matrices."""
-    n = len(graph.inner)
+    """Return which pairs are consistent, and their weights, as (N, N) matrices."""
+    n = len(graph.start) - 1
     consistent, weights = np.zeros((n, n)), np.zeros((n, n))
     for i in range(n):
-        consistent[i, graph.index[graph.start[i]:graph.inner[i]]] = 1
         row = slice(graph.start[i], graph.start[i + 1])
+        assert len(np.unique(graph.index[row])) == row.stop - row.start
+        consistent[i, graph.index[row]] = 1
         weights[i, graph.index[row]] = graph.weight[row]
     return consistent, weights
 
@@ -64,7 +67,7 @@ def assert_graph_and_rows(matches, config, printed_cutoff=None):
     # a pair within rounding of the threshold may fall on either side
     edge = np.abs(gaps - config.sigma_d) < 1e-9
     assert np.array_equal(found[~edge], consistent[~edge])
-    np.testing.assert_allclose(found_weights, weights, atol=1e-6)
+    np.testing.assert_allclose(found_weights, weights * found, atol=1e-6)
     np.testing.assert_allclose(leading_eigenvector(graph),
                                dense.leading_eigenvector(consistent * weights), atol=1e-5)
 
@@ -108,6 +111,26 @@ def test_rows_of_whole_and_broken_words(n):
     """The bits of a row are kept in words of 64."""
     matches, _ = random_matches(n, 0.5, n)
     assert_graph_and_rows(matches, SgorConfig(groups=10, group_size=30, sigma_d=2.0))
+
+
+@pytest.mark.parametrize('cutoff', CUTOFFS)
+@pytest.mark.parametrize('groups', [63, 64, 65, 200, 258])
+def test_more_keys_than_a_word_has_bits(groups, cutoff):
+    """Keys are worked on in blocks of 64, divided where they stand: each has its own row."""
+    matches, _ = random_matches(260, 0.3, groups)
+    assert_graph_and_rows(matches, SgorConfig(
+        groups=groups, group_size=60, sigma_d=1.0, weight_cutoff=cutoff))
+
+
+def test_threads_change_nothing():
+    """The same sums in the same order, however many threads take the pieces."""
+    matches, _ = random_matches(3000, 0.05, 8)
+    for config in (SgorConfig(), PAPER):
+        one, two = (register_correspondences(matches.source, matches.target,
+                                             config=config.replace(threads=threads))
+                    for threads in (1, 2))
+        assert np.array_equal(one.hypotheses, two.hypotheses)
+        assert np.array_equal(one.T_target_source, two.T_target_source)
 
 
 @pytest.mark.parametrize('name', ['000', '010', '020'])
@@ -188,7 +211,29 @@ def test_order_of_matches_changes_nothing():
 
 
 def test_memory_of_8000_matches(data_folder):
-    """The graph of 8,000 matches takes a small part of what N x N would."""
+    """The graph takes memory for consistent pairs alone, however far W_m reaches."""
     matches, _ = random_matches(8000, 0.02, 6)
-    graph = consistency_graph(matches, SgorConfig())
-    assert graph.index.nbytes + graph.weight.nbytes < 0.05 * 8000 * 8000 * 8
+    for config in (SgorConfig(), PAPER):
+        tracemalloc.start()
+        graph = consistency_graph(matches, config)
+        _, peak = tracemalloc.get_traced_memory()
+        tracemalloc.stop()
+        pairs = len(graph.index)
+        assert pairs < 0.02 * 8000**2
+        assert graph.index.nbytes + graph.weight.nbytes == 6 * pairs
+        # the upper half of the pairs beside all, and one band of bits for each core
+        assert peak < 12 * pairs + 5e6
+
+
+def test_many_matches_are_counted_in_more_bits():
+    """Beyond 65,536 matches an index takes 32 bits; the far ones have edges like the others."""
+    matches, _ = random_matches(66000, 1.0, 9)
+    wrong = np.random.default_rng(0).permutation(66000)[:64000]
+    matches.target[wrong] += np.arange(64000)[:, None] * [3.0, 0, 0]    # each by another length
+    graph = consistency_graph(matches, SgorConfig(sigma_d=0.01))
+    assert graph.index.dtype == np.uint32
+    for i in (0, 65535, 65536, 65999):
+        row = graph.index[graph.start[i]:graph.start[i + 1]]
+        gaps = np.abs(np.linalg.norm(matches.source - matches.source[i], axis=1)
+                      - np.linalg.norm(matches.target - matches.target[i], axis=1))
+        assert set(row) == set(np.flatnonzero(gaps <= 0.01))

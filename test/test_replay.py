@@ -311,7 +311,8 @@ def test_corrupt_bags(street_bag, tmp_path, capsys, kind):
     assert not (tmp_path / 'out').exists()
     tools = {'text.bag': 'rosbag reindex', 'text.mcap': 'mcap recover'}
     assert ('mends it' in said) is (kind in (
-        'text.mcap', 'text.db3', 'text.bag', 'metadata', 'truncated', 'empty', 'garbage'))
+        'text.mcap', 'text.db3', 'text.bag', 'metadata', 'truncated', 'empty', 'garbage',
+        'no storage'))
     assert 'mends it' not in said or tools.get(kind, 'ros2 bag reindex') in said
 
 

@@ -30,6 +30,7 @@ CODES = {
     BROKE_OFF: 'broke off: disk full, out of memory, or a fault of the program (with a traceback)',
     INTERRUPTED: 'ended by SIGINT (Ctrl-C); 143 by SIGTERM'}
 HELP_WIDTH = 98
+AGAIN_S = 0.1
 
 
 class _Formatter(ArgumentDefaultsHelpFormatter, RawDescriptionHelpFormatter):
@@ -106,29 +107,54 @@ class _Ended(BaseException):
 
 
 class _Signals:
-    """Notes SIGINT and SIGTERM and raises `_Ended` where they find the main thread."""
+    """Turns SIGINT and SIGTERM into `_Ended`, in whatever the main thread does just then.
+
+    Where that is a callback from C code, such as one of the compiler, the exception is lost: it
+    is raised again until it is on its way.
+    """
 
     def __init__(self) -> None:
         self.came = 0
         self._before: dict[int, Any] = {}
+        self._told = sys.unraisablehook
 
     def __enter__(self) -> None:
         if threading.current_thread() is not threading.main_thread():
             return
+        sys.unraisablehook = self._tell
+        self._before[signal.SIGALRM] = signal.signal(signal.SIGALRM, self._again)
         for number in (signal.SIGINT, signal.SIGTERM):
             # ignored in the background of a script, say
             if signal.getsignal(number) is not signal.SIG_IGN:
                 self._before[number] = signal.signal(number, self._end)
 
     def __exit__(self, *_: object) -> None:
+        if not self._before:
+            return
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
         for number, handler in self._before.items():
             signal.signal(number, handler)
+        sys.unraisablehook = self._told
 
     def _end(self, number: int, _: FrameType | None) -> None:
         self.came = number
         # the next one ends what clears away
         signal.signal(number, signal.SIG_DFL)
+        signal.setitimer(signal.ITIMER_REAL, AGAIN_S, AGAIN_S)
         raise _Ended
+
+    def _again(self, _: int, __: FrameType | None) -> None:
+        """Raise once more, unless what is at work is the clearing away after the first."""
+        error = sys.exception()
+        while error is not None:
+            if isinstance(error, _Ended):
+                return
+            error = error.__context__
+        raise _Ended
+
+    def _tell(self, lost: Any) -> None:
+        if lost.exc_type is not _Ended:
+            self._told(lost)
 
 
 def _by_signal(number: int) -> int:

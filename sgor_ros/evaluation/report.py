@@ -150,9 +150,13 @@ def scan_records(tracks: Sequence[Track]) -> list[dict[str, Any]]:
 def solver_table(rows: Sequence[Solved]) -> str:
     """Return times and errors of each solver on each set of matches."""
     return markdown(
-        ['matches', 'count', 'right [%]', 'solver', 'time [ms]', 'runs', 'RE [deg]', 'TE [cm]'],
-        [[row.matches, str(row.count), f'{100 * row.inlier_share:.2f}', row.solver,
-          f'{1e3 * row.seconds_median:.1f} / {1e3 * row.seconds_p95:.1f}', str(row.runs),
+        ['matches', 'count', 'right [%]', 'pairs consistent [%]', 'solver', 'time [ms]',
+         'CPU [ms]', 'time / count^2 [ns]', 'runs', 'RE [deg]', 'TE [cm]'],
+        [[row.matches, str(row.count), f'{100 * row.inlier_share:.2f}',
+          f'{100 * row.consistent_share:.2f}', row.solver,
+          f'{1e3 * row.seconds_median:.1f} / {1e3 * row.seconds_p95:.1f}',
+          f'{1e3 * row.cpu_seconds:.1f}', f'{1e9 * row.seconds_median / row.count**2:.2f}',
+          str(row.runs),
           *(('failed', 'failed') if math.isnan(row.rotation_error_deg) else
             (f'{row.rotation_error_deg:.3f}', f'{100 * row.translation_error_m:.1f}'))]
          for row in rows])

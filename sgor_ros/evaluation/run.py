@@ -150,17 +150,18 @@ def _rival(function: Callable[[Points, Points, float], Answer], voxel_m: float, 
 def rivals(say: Callable[[str], None]) -> dict[str, Method]:
     """Return the rivals that are installed, by the names to ask for them."""
     found = {}
-    if _installed('kiss_matcher', say):
+    if installed('kiss_matcher', say):
         for voxel_m in (0.3, 0.5):
             found[f'kiss-matcher-{voxel_m}'] = rival('KISS-Matcher', kiss_matcher, voxel_m,
                                                      refuses=True)
-    if _installed('open3d', say):
+    if installed('open3d', say):
         found['ransac'] = rival('Open3D RANSAC', ransac, 0.5, refuses=False)
         found['fgr'] = rival('Open3D FGR', fast_global, 0.5, refuses=False)
     return found
 
 
-def _installed(module: str, say: Callable[[str], None]) -> bool:
+def installed(module: str, say: Callable[[str], None]) -> bool:
+    """Tell whether a rival's module is there, and say so if it is not."""
     if find_spec(module) is not None:
         return True
     say(f'{module} is not installed, so left out; to have it: pip install {module}')

@@ -1,7 +1,6 @@
 """Semantic-geometric consistency (Sec. III-C, Eq. 7 and 9 to 13): what is kept of each group.
 
-The top-k of the paper reads one row of M* for each group, the seed's: it is summed along the
-edges of the consistency graph.
+The top-k of the paper reads one row of M* for each group, the seed's.
 """
 from dataclasses import dataclass
 
@@ -9,12 +8,18 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from ..common.threads import shared
 from ..matching.correspondences import Correspondences
 from ..scan.labels import labels_agree
 from .graph import ConsistencyGraph
 from .grouping import Groups
 from .grouping import squared_distance
+from .lengths import U64
+from .seed_rows import add_support
+from .seed_rows import BLOCK
+from .seed_rows import Block
+from .seed_rows import blocks_of
+from .seed_rows import choose
+from .seed_rows import far_rows
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,47 +65,41 @@ def filter_groups(correspondences: Correspondences, graph: ConsistencyGraph, gro
     semantics : {'loose', 'hard', 'none'}
         See `SgorConfig`.
     """
-    filtered = FilteredGroups(np.full((len(groups.keys), keep), -1, np.int64),
-                              np.zeros((len(groups.keys), keep), np.float32))
-    shared(_filter, len(groups.keys), graph.start, graph.inner, graph.index, graph.weight,
-           correspondences.source, groups.keys, groups.squared_reach,
-           *label_agreement(correspondences, semantics), filtered.kept, filtered.scores)
+    count, n = len(groups.keys), len(correspondences)
+    filtered = FilteredGroups(np.full((count, keep), -1, np.int64),
+                              np.zeros((count, keep), np.float32))
+    agreement = label_agreement(correspondences, semantics)
+    support = np.empty((BLOCK, -(-n // 64) * 64), np.float32)
+    far = far_rows(correspondences, graph, count)
+    for places in blocks_of(correspondences.source[groups.keys], np.arange(count)):
+        near, wanted = np.zeros((2, n), np.uint64)
+        keys = groups.keys[places]
+        visits = _mark_keys(graph.start, graph.index, correspondences.source, keys,
+                            groups.squared_reach[places], *agreement, near, wanted)
+        block = Block(near, wanted, np.flatnonzero(wanted), visits)
+        add_support(correspondences, graph, far, block, keys, support)
+        choose(graph, block, support, places, filtered.kept, filtered.scores)
     return filtered
 
 
 @numba.njit(cache=True, nogil=True)
-def _filter(first, last, start, inner, index, weight, points, keys,
-            squared_reach, tight, loose, kept, scores):
-    support = np.empty(len(inner), np.float32)
-    for g in range(first, last):
+def _mark_keys(start, index, points, keys, squared_reach, tight,
+               loose, near, wanted):
+    """Set bit g of `near` for what is consistent with key g; of `wanted` if it may be kept.
+
+    Return how long the rows of all that is near are together.
+    """
+    visits = U64(0)
+    for g in range(U64(len(keys))):
         key = keys[g]
-        support[:] = 0    # row of M'_g W_m
-        for k in range(start[key], inner[key]):
-            a = index[k]
-            for e in range(start[a], start[a + 1]):
-                support[index[e]] += weight[e]
+        bit = U64(1) << g
         x, y, z = points[key]
-        for k in range(start[key], inner[key]):
-            j = index[k]
-            if squared_distance(points[j, 0], points[j, 1], points[j, 2], x, y, z
-                                ) > squared_reach[g]:
-                continue
+        for k in range(start[key], start[key + U64(1)]):
+            j = U64(index[k])
+            near[j] |= bit
+            visits += start[j + U64(1)] - start[j]
             # M_s is the outer product of these with themselves (Eq. 9 to 11)
-            if not ((tight[key] and tight[j]) or (loose[key] and loose[j])):
-                continue
-            total = np.float32(0.0)
-            for e in range(start[j], inner[j]):
-                total += support[index[e]]
-            _insert(total, j, scores[g], kept[g])
-
-
-@numba.njit(cache=True, nogil=True)
-def _insert(score, item, scores, items):
-    """Put an item into its place among the best; the worst drops out."""
-    at = len(scores) - 1
-    if score <= scores[at]:
-        return
-    while at > 0 and scores[at - 1] < score:
-        scores[at], items[at] = scores[at - 1], items[at - 1]
-        at -= 1
-    scores[at], items[at] = score, item
+            if ((tight[key] and tight[j]) or (loose[key] and loose[j])) and squared_distance(
+                    points[j, 0], points[j, 1], points[j, 2], x, y, z) <= squared_reach[g]:
+                wanted[j] |= bit
+    return visits

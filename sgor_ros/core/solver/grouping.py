@@ -9,14 +9,12 @@ from ..common.threads import shared
 from ..config import SgorConfig
 from ..matching.correspondences import Correspondences
 from .graph import ConsistencyGraph
-from .graph import U64
+from .lengths import U64
 
 POWER_ITERATIONS = 10
 """As PointDSC; the order of the keys has settled by then."""
 MOST_VISITS, FEWEST_GROUPS = 1e8, 20
 """Edges to visit for all seed rows, some tenths of a second; and the groups that remain."""
-BINS = 1024
-"""Of the histogram that selects the k-th nearest."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,8 +26,8 @@ class Groups:
     keys : (L,) uint32
         Key correspondences G^k, the strongest first; fewer than asked for in a dense graph.
     squared_reach : (L,) float64
-        Squared distance from each key to its k-th nearest correspondence on the source, itself
-        the first, m^2: a group is all up to there.
+        A group is all correspondences with a squared distance on the source up to this from the
+        key, m^2: the k nearest, itself the first, and what is as far as the last of them.
     """
 
     keys: NDArray[np.uint32]
@@ -44,12 +42,14 @@ def group(correspondences: Correspondences, graph: ConsistencyGraph,
     keys = _spread(correspondences.source, order, min(config.groups, len(order)),
                    config.key_spacing)
     # where most matches are right, rows are long and few groups do
-    visits = np.cumsum((graph.inner - graph.start[:-1])[keys].astype(np.float64)**2)
+    visits = np.cumsum(np.diff(graph.start)[keys].astype(np.float64)**2)
     keys = keys[:max(int(np.searchsorted(visits, MOST_VISITS)), FEWEST_GROUPS)]
     k = min(config.group_size, len(correspondences))
     reach = np.empty(len(keys))
+    # no two are farther apart
+    most = 1e-9 + 1.001 * float((np.ptp(correspondences.source, axis=0)**2).sum())
     shared(_squared_reach, len(keys), np.ascontiguousarray(correspondences.source.T), keys, k,
-           reach)
+           most, reach)
     return Groups(keys, reach)
 
 
@@ -61,22 +61,20 @@ def leading_eigenvector(graph: ConsistencyGraph) -> NDArray[np.float32]:
     (N,) float32
         Not negative, length one.
     """
-    vector = np.ones(len(graph.inner), np.float32)
+    vector = np.ones(len(graph.start) - 1, np.float32)
     product = np.empty_like(vector)
     for _ in range(POWER_ITERATIONS):
-        shared(_multiply, len(vector), graph.start, graph.inner, graph.index, graph.weight, vector,
-               product)
+        shared(_multiply, len(vector), graph.start, graph.index, graph.weight, vector, product)
         vector, product = product / np.linalg.norm(product), vector
     return vector
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True)
-def _multiply(first, last, start, inner, index, weight, vector,
-              product):
+def _multiply(first, last, start, index, weight, vector, product):
     for i in range(U64(first), U64(last)):
         # four sums, so that an addition need not wait for the one before
         a = b = c = d = np.float32(0.0)
-        e, end = start[i], inner[i]
+        e, end = start[i], start[i + U64(1)]
         while e + U64(4) <= end:
             a += weight[e] * vector[index[e]]
             b += weight[e + U64(1)] * vector[index[e + U64(1)]]
@@ -119,15 +117,15 @@ def _spread(points, order, count, spacing):
 
 
 @numba.njit(cache=True, nogil=True)
-def _squared_reach(first, last, columns, keys, k, reach):
-    """Write the k-th smallest squared distance to each key: for large k faster than a tree."""
+def _squared_reach(first, last, columns, keys, k, most, reach):
+    """Write how far the k nearest of each key reach: for large k faster than a tree."""
     n = columns.shape[1]
+    squared = np.empty(n)
     for g in range(U64(first), U64(last)):
         x, y, z = columns[:, keys[g]]
-        squared = np.empty(n)
         for i in range(n):
             squared[i] = squared_distance(columns[0, i], columns[1, i], columns[2, i], x, y, z)
-        reach[g] = _kth_smallest(squared, k)
+        reach[g] = _bound_of_nearest(squared, k, most)
 
 
 @numba.njit(cache=True, nogil=True, inline='always')
@@ -137,50 +135,34 @@ def squared_distance(ax, ay, az, bx, by, bz):
 
 
 @numba.njit(cache=True, nogil=True)
-def _kth_smallest(values, k):
-    """Select by a histogram first, so that only one bin of it is sorted."""
-    top = 0.0
-    for v in values:
-        top = max(top, v)
-    if top == 0:
-        return top
-    scale = (BINS - 1) / top
-    count = np.zeros(BINS, np.int64)
-    for v in values:
-        count[U64(v * scale)] += 1
-    before, at = 0, 0
-    while before + count[at] < k:
-        before += count[at]
-        at += 1
-    inside = np.empty(count[at])
-    n = 0
-    for v in values:
-        if U64(v * scale) == at:
-            inside[n] = v
-            n += 1
-    return _select(inside, k - before - 1)
+def _bound_of_nearest(squared, k, most):
+    """Narrow the range up to `most` until k values are within; vectors count fast."""
+    low, high = 0.0, most
+    below, within = _count_within(squared, low), len(squared)
+    if below >= k:
+        return low
+    halve = False
+    while within != k:
+        # where it should be if all were evenly spread, and every second time in the middle
+        share = 0.5 if halve else (k - below + 0.5) / (within - below + 1.0)
+        middle = low + share * (high - low)
+        if middle <= low or middle >= high:
+            if halve:    # several at the same distance
+                break
+            halve = True
+            continue
+        halve = not halve
+        count = _count_within(squared, middle)
+        if count < k:
+            low, below = middle, count
+        else:
+            high, within = middle, count
+    return high
 
 
 @numba.njit(cache=True, nogil=True)
-def _select(values, k):
-    """Return what stands at place k of the sorted values; spoils their order (Hoare)."""
-    low, high = 0, len(values) - 1
-    while low < high:
-        pivot = values[(low + high) // 2]
-        i, j = low, high
-        while i <= j:
-            while values[i] < pivot:
-                i += 1
-            while values[j] > pivot:
-                j -= 1
-            if i <= j:
-                values[i], values[j] = values[j], values[i]
-                i += 1
-                j -= 1
-        if k <= j:
-            high = j
-        elif k >= i:
-            low = i
-        else:
-            break
-    return values[k]
+def _count_within(values, bound):
+    count = 0
+    for i in range(len(values)):
+        count += values[i] <= bound
+    return count

@@ -82,7 +82,8 @@ def truncated_distance(T: NDArray[np.float64], source: NDArray[np.float64],
                        target: NDArray[np.float64], sigma_d: float) -> NDArray[np.float64]:
     """Return the mean of TD over (N, 3) matches for each of (H, 4, 4) (Eq. 18 and 19), metres."""
     cost = np.empty(len(T))
-    shared(_truncated_distance, len(T), T, source, target, sigma_d, cost)
+    shared(_truncated_distance, len(T), T, np.ascontiguousarray(source.T),
+           np.ascontiguousarray(target.T), sigma_d, cost)
     return cost
 
 
@@ -90,32 +91,43 @@ def near_counts(T: NDArray[np.float64], source: NDArray[np.float64], target: NDA
                 reach: float) -> NDArray[np.int64]:
     """Return how many of (N, 3) matches lie within `reach` metres for each of (H, 4, 4)."""
     counts = np.zeros(len(T), np.int64)
-    shared(_near_counts, len(T), T, source, target, reach, counts)
+    shared(_near_counts, len(T), T, np.ascontiguousarray(source.T),
+           np.ascontiguousarray(target.T), reach, counts)
     return counts
 
 
-@numba.njit(cache=True, nogil=True, inline='always')
-def _squared_distance(T, p, q):
-    squared = 0.0
-    for a in range(3):
-        gap = T[a, 0] * p[0] + T[a, 1] * p[1] + T[a, 2] * p[2] + T[a, 3] - q[a]
-        squared += gap * gap
-    return squared
+@numba.njit(cache=True, nogil=True, fastmath=True)
+def _squared_distances(T, source, target, squared):
+    """Write how far each match lies apart, squared; (3, N) columns, so that there are vectors."""
+    # all out of the loop: what is written might be a part of it
+    (a, b, c, x0), (d, e, f, y0), (g, h, k, z0) = T[0], T[1], T[2]
+    px, py, pz = source[0], source[1], source[2]
+    qx, qy, qz = target[0], target[1], target[2]
+    for i in range(len(squared)):
+        x = a * px[i] + b * py[i] + c * pz[i] + x0 - qx[i]
+        y = d * px[i] + e * py[i] + f * pz[i] + y0 - qy[i]
+        z = g * px[i] + h * py[i] + k * pz[i] + z0 - qz[i]
+        squared[i] = x * x + y * y + z * z
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True)
 def _truncated_distance(first, last, T, source, target, sigma_d,
                         cost):
+    squared = np.empty(source.shape[1])
     for h in range(first, last):
+        _squared_distances(T[h], source, target, squared)
         total = 0.0
-        for i in range(len(source)):
-            squared = _squared_distance(T[h], source[i], target[i])
-            total += min(max(np.sqrt(squared), 0.5 * sigma_d), 2.5 * sigma_d)
-        cost[h] = total / len(source)
+        for i in range(len(squared)):
+            total += min(max(np.sqrt(squared[i]), 0.5 * sigma_d), 2.5 * sigma_d)
+        cost[h] = total / len(squared)
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True)
 def _near_counts(first, last, T, source, target, reach, counts):
+    squared = np.empty(source.shape[1])
     for h in range(first, last):
-        for i in range(len(source)):
-            counts[h] += _squared_distance(T[h], source[i], target[i]) < reach * reach
+        _squared_distances(T[h], source, target, squared)
+        near = 0
+        for i in range(len(squared)):
+            near += squared[i] < reach * reach
+        counts[h] = near
