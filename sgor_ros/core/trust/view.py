@@ -107,7 +107,8 @@ def view(nearest: NDArray[np.float32], features: Features, normals: NDArray[np.f
 
 def _overhead(placed: NDArray[np.float64], facing: NDArray[np.float64],
               labels: NDArray[np.uint8], edge: float) -> OverheadMap:
-    half = math.ceil(np.abs(placed[:, :2]).max(initial=0.0) / edge) + 1
+    # room for a border of one cell, also around a point on the edge between two
+    half = math.floor(np.abs(placed[:, :2]).max(initial=0.0) / edge) + 2
     cells = np.zeros((2 * half, 2 * half), np.uint64)
     columns = np.floor(placed[:, :2] / edge).astype(np.int64) + half
     kinds, sectors = kinds_of(labels, placed[:, 2], edge), sectors_of(facing)
