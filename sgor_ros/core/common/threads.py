@@ -2,8 +2,6 @@
 
 Compiled kernels are serial and let go of the interpreter; what runs in parallel is calls of them
 on pieces of the work. Numba's own parallel loops took three times as long to compile.
-
-Imported before small_gicp's OpenMP is loaded: it reads the policy then.
 """
 from collections.abc import Callable
 from collections.abc import Iterator
@@ -13,9 +11,6 @@ from itertools import count as counter
 import os
 import threading
 from typing import Any
-
-# spinning threads slow everything down three- to fourfold when other processes need the cores
-os.environ.setdefault('OMP_WAIT_POLICY', 'passive')
 
 import numba
 from threadpoolctl import ThreadpoolController
