@@ -417,9 +417,9 @@ def test_a_second_run_has_a_folder_of_its_own(tmp_path, monkeypatch, capsys):
 
 @pytest.mark.parametrize(('break_it', 'message'), [
     (lambda d: (d / 'poses.txt').write_text('1 2 3\n'), 'expected 12 numbers a line'),
-    (lambda d: (d / 'poses.txt').write_text('1 0 0 0 0 1 0 0 0 0 1 0\n'), '1 poses for 2 scans'),
-    (lambda d: (d / 'calib.txt').write_text('P0: 1\n'), 'expected a line "Tr:"'),
-    (lambda d: [scan.unlink() for scan in (d / 'velodyne').iterdir()], 'no .bin in it'),
+    (lambda d: (d / 'poses.txt').write_text('1 0 0 0 0 1 0 0 0 0 1 0\n'), 'poses.txt: 1 rows for'),
+    (lambda d: (d / 'calib.txt').write_text('P0: 1\n'), 'no row Tr'),
+    (lambda d: [scan.unlink() for scan in (d / 'velodyne').iterdir()], 'no .bin files'),
     (lambda d: (d / 'pairs.json').write_text('[{"source": 1}]'), 'expected source, target'),
 ])
 def test_broken_drives_are_told_in_one_line(break_it, message, street, tmp_path, capsys):

@@ -183,6 +183,8 @@ def set_parameter(partner, name, value):
 
 def test_a_parameter_changed_on_the_way_takes_effect(partner, street):
     first, second, third, fourth = clouds_of(street[:4])
+    # so that every scan is matched
+    assert set_parameter(partner, 'predict_first', False).successful
     partner.outcome(first)
     assert int(partner.outcome(second)[2]['correspondences']) > 60
     assert set_parameter(partner, 'max_correspondences', 60).successful
@@ -193,6 +195,7 @@ def test_a_parameter_changed_on_the_way_takes_effect(partner, street):
     assert level == OK
     assert int(values['correspondences']) > 60
     assert set_parameter(partner, 'mode', 'keyframe').successful
+    assert set_parameter(partner, 'predict_first', True).successful
 
 
 @pytest.mark.parametrize(('name', 'value', 'words'), [

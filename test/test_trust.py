@@ -209,5 +209,5 @@ def test_wrong_command_tells_kinds_of_place_apart(tmp_path, capsys):
     (['--kinds', 'mine'], f'--kinds mine: not one of {", ".join(KINDS)}'),
     (['--limit', '0', '--count', '0', '--per-kind', '0'], 'nothing is left to do')])
 def test_unusable_options_are_told_in_one_line(arguments, message, tmp_path, capsys):
-    assert main(['wrong', *arguments, '--output', str(tmp_path)]) == 2
+    assert main(['wrong', *arguments, '--output', str(tmp_path / 'out')]) == 2
     assert message in capsys.readouterr().err.strip().splitlines()[-1]

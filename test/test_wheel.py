@@ -111,6 +111,6 @@ def test_types_reach_those_who_use_the_package(stranger, tmp_path):
     assert done.returncode == 0, done.stdout + done.stderr
     wrong = tmp_path / 'wrong.py'
     wrong.write_text('from sgor_ros import SemanticScan, register\n'
-                     'register(SemanticScan([[0, 0, 0]]), 3)\n')
+                     'scan = SemanticScan([[0, 0, 0]])\nregister(scan, scan, 3)\n')
     done = strictly(stranger, tmp_path, wrong)
-    assert 'Argument 2 to "register" has incompatible type "int"' in done.stdout
+    assert 'Argument 3 to "register" has incompatible type "int"' in done.stdout

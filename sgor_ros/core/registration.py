@@ -53,7 +53,7 @@ def register(source: SemanticScan | PreparedScan | ArrayLike,
         Prepared scans are used as they are: prepare once, register often. Arrays are points
         without labels, metres.
     config : SgorConfig, optional
-        ``SgorConfig.outdoor()`` where none is given.
+        ``SgorConfig()`` where none is given.
 
     Returns
     -------

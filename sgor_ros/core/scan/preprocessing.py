@@ -55,7 +55,7 @@ def preprocess(scan: SemanticScan | ArrayLike, config: SgorConfig | None = None,
     scan : SemanticScan or (N, 3) array
         An array is points without labels, metres.
     config : SgorConfig, optional
-        ``SgorConfig.outdoor()`` where none is given.
+        ``SgorConfig()`` where none is given.
     keypoints : (V, 3) array, optional
         Keypoints of the caller, metres, in place of the voxels.
     descriptors : (V, D) array, optional
