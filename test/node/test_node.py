@@ -31,7 +31,7 @@ from sgor_ros.ros.types import ros_type
 from sgor_ros.world import Lidar
 from sgor_ros.world import simulate
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 OK, WARN, ERROR = b'\x00', b'\x01', b'\x02'
 SECOND = 1_000_000_000
 SMALL = Lidar(beams=32, columns=600)

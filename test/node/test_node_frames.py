@@ -23,7 +23,7 @@ from sgor_ros.ros.player import Domain
 from sgor_ros.ros.player import NodeProcess
 from sgor_ros.ros.types import ros_type
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 HERE = Path(__file__).parent
 # where scripts/tf2_msgs.sh puts it
 TF2_MSGS = Path(os.environ.get('SGOR_TF2_MSGS', f'{sys.prefix}/tf2_msgs'))
