@@ -24,7 +24,6 @@ from sgor_ros import TrackerConfig
 from sgor_ros.io.messages import matrix_of
 from sgor_ros.ros.parameters import NodeConfig
 from sgor_ros.ros.parameters import yaml_files
-from sgor_ros.ros.player import Domain
 from sgor_ros.ros.player import NodeProcess
 from sgor_ros.ros.player import SETTLING_S
 from sgor_ros.ros.types import ros_type
@@ -44,13 +43,6 @@ def street():
     """Return the first scans of a drive: [(stamp in ns, points, labels, true pose)]."""
     return [(100 * SECOND + round(stamp * SECOND), points, labels, pose)
             for stamp, points, labels, pose in simulate(8, seed=0, lidar=SMALL)]
-
-
-@pytest.fixture(scope='module')
-def domain():
-    domain = Domain()
-    yield domain
-    domain.close()
 
 
 @pytest.fixture(scope='module')
