@@ -11,7 +11,7 @@ import pytest
 
 from sgor_ros.world import simulate
 
-EXAMPLES = Path(__file__).resolve().parents[1] / 'examples'
+EXAMPLES = Path(__file__).resolve().parents[2] / 'examples'
 TESTED = {'bag', 'label_convention', 'own_features', 'own_labels', 'pose_graph_g2o',
           'pose_graph_gtsam', 'register_two_scans'}
 

@@ -19,7 +19,7 @@ from sgor_ros.ros.player import Domain
 from sgor_ros.world import Lidar
 from sgor_ros.world import simulate
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 COMMANDS = {'sgor_node', 'sgor_replay', 'sgor_register', 'sgor_kitti_to_bag', 'sgor_benchmark',
             'sgor_demo', 'sgor_tables', 'sgor_warm_up'}
 SITE = f'lib/python3.{sys.version_info.minor}/site-packages'

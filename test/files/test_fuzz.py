@@ -6,7 +6,7 @@ import shutil
 import subprocess
 import sys
 
-FUZZ = Path(__file__).parent / 'fuzz'
+FUZZ = Path(__file__).parents[1] / 'fuzz'
 COUNT = 80
 DOORS = """
 import os

@@ -19,11 +19,10 @@ from sgor_ros.io.frames import parse_transform
 from sgor_ros.io.messages import matrix_of
 from sgor_ros.io.messages import matrix_of_transform
 from sgor_ros.io.messages import transform_stamped
-from sgor_ros.ros.player import Domain
 from sgor_ros.ros.player import NodeProcess
 from sgor_ros.ros.types import ros_type
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 HERE = Path(__file__).parent
 # where scripts/tf2_msgs.sh puts it
 TF2_MSGS = Path(os.environ.get('SGOR_TF2_MSGS', f'{sys.prefix}/tf2_msgs'))
@@ -32,13 +31,6 @@ INSTALLED = {name: find_spec(name) is not None for name in ('tf2_msgs', 'tf2_ros
 OK, WARN = b'\x00', b'\x01'
 MOUNT = '1.2 -0.3 1.8 0.05 0.1 1.5'
 T_BASE_SENSOR = parse_transform(MOUNT, 'mount')
-
-
-@pytest.fixture(scope='module')
-def domain():
-    domain = Domain()
-    yield domain
-    domain.close()
 
 
 @pytest.fixture(scope='module')

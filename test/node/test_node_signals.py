@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 import ros_helpers as ros
 
-from sgor_ros.ros.player import Domain
 from sgor_ros.ros.player import NodeProcess
 from sgor_ros.world import Lidar
 from sgor_ros.world import simulate
@@ -19,13 +18,6 @@ TIMEOUT_S = 30.0
 KINDS = [(signal.SIGTERM,), (signal.SIGINT,), (signal.SIGINT, signal.SIGINT),
          (signal.SIGINT, signal.SIGTERM, signal.SIGINT)]
 COUNTS = r'received \d+, processed \d+, replaced \d+, failed 0'
-
-
-@pytest.fixture(scope='module')
-def domain():
-    domain = Domain()
-    yield domain
-    domain.close()
 
 
 @pytest.fixture(scope='module')

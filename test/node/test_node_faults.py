@@ -12,7 +12,6 @@ from std_srvs.srv import Trigger
 
 from sgor_ros.io.messages import matrix_of
 from sgor_ros.io.messages import stamp_ns_of
-from sgor_ros.ros.player import Domain
 from sgor_ros.ros.player import NodeProcess
 from sgor_ros.world import Lidar
 from sgor_ros.world import simulate
@@ -20,13 +19,6 @@ from sgor_ros.world import simulate
 OK, WARN, ERROR = b'\x00', b'\x01', b'\x02'
 PERIOD_NS = 100_000_000
 WRONG_M, WRONG_RAD = 1.0, 0.1
-
-
-@pytest.fixture(scope='module')
-def domain():
-    domain = Domain()
-    yield domain
-    domain.close()
 
 
 @pytest.fixture(scope='module')

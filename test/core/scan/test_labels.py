@@ -32,7 +32,7 @@ PUBLISHED = {
              'Vegetation Terrain Sky Pedestrians Rider Car Truck Bus Train Motorcycle Bicycle '
              'Static Dynamic Other Water RoadLines Ground Bridge RailTrack GuardRail',
 }
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[3]
 
 
 def decode(name, ids):
@@ -242,7 +242,7 @@ def test_names_that_are_none(name):
 
 
 def test_a_mask_has_32_bits(tmp_path):
-    text = (Path(__file__).parents[1] / 'config/labels/nuscenes.yaml').read_text()
+    text = (Path(__file__).parents[3] / 'config/labels/nuscenes.yaml').read_text()
     (tmp_path / 'a.yaml').write_text(f'{text}\nmask: {2**63}\n')
     with pytest.raises(InputError, match='mask must be in 0 to 0xFFFFFFFF'):
         label_convention(str(tmp_path / 'a.yaml'))

@@ -21,7 +21,7 @@ from sgor_ros.ros.parameters import NodeConfig
 from sgor_ros.world import Lidar
 from sgor_ros.world import scenes
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 PAGES = [ROOT / 'README.md', *sorted((ROOT / 'docs').glob('*.md'))]
 
 

@@ -24,14 +24,13 @@ from sgor_ros import TrackerConfig
 from sgor_ros.io.messages import matrix_of
 from sgor_ros.ros.parameters import NodeConfig
 from sgor_ros.ros.parameters import yaml_files
-from sgor_ros.ros.player import Domain
 from sgor_ros.ros.player import NodeProcess
 from sgor_ros.ros.player import SETTLING_S
 from sgor_ros.ros.types import ros_type
 from sgor_ros.world import Lidar
 from sgor_ros.world import simulate
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 OK, WARN, ERROR = b'\x00', b'\x01', b'\x02'
 SECOND = 1_000_000_000
 SMALL = Lidar(beams=32, columns=600)
@@ -44,13 +43,6 @@ def street():
     """Return the first scans of a drive: [(stamp in ns, points, labels, true pose)]."""
     return [(100 * SECOND + round(stamp * SECOND), points, labels, pose)
             for stamp, points, labels, pose in simulate(8, seed=0, lidar=SMALL)]
-
-
-@pytest.fixture(scope='module')
-def domain():
-    domain = Domain()
-    yield domain
-    domain.close()
 
 
 @pytest.fixture(scope='module')

@@ -11,7 +11,7 @@ import zipfile
 
 import pytest
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = ROOT / 'examples'
 
 

@@ -16,20 +16,12 @@ from sgor_ros.io.frames import parse_transform
 from sgor_ros.io.messages import matrix_of
 from sgor_ros.io.messages import pose
 from sgor_ros.ros.gaps import Gaps
-from sgor_ros.ros.player import Domain
 from sgor_ros.ros.player import NodeProcess
 from sgor_ros.ros.types import ros_type
 
 OK, WARN, ERROR, STALE = b'\x00', b'\x01', b'\x02', b'\x03'
 PERIOD_NS = 100_000_000
 MOUNT = '1.2 -0.3 1.8 0.05 0.1 1.5'
-
-
-@pytest.fixture(scope='module')
-def domain():
-    domain = Domain()
-    yield domain
-    domain.close()
 
 
 @pytest.fixture(scope='module')

@@ -42,7 +42,7 @@ from sgor_ros.evaluation.protocols.truth import refined
 from sgor_ros.world import Lidar
 from sgor_ros.world import simulate
 
-DATA = Path(__file__).resolve().parents[2] / 'shared/data'
+DATA = Path(__file__).resolve().parents[3] / 'shared/data'
 needs_data = pytest.mark.skipif(not DATA.is_dir(), reason='no shared data')
 
 

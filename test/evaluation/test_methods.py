@@ -22,7 +22,7 @@ from sgor_ros.evaluation.metrics import rotation_error_deg
 from sgor_ros.evaluation.metrics import translation_error_m
 from sgor_ros.evaluation.protocols.tables import percent
 
-SETS = Path(__file__).resolve().parents[2] / 'shared/data/correspondences'
+SETS = Path(__file__).resolve().parents[3] / 'shared/data/correspondences'
 T_TRUE = se3.compose(Rotation.from_euler('zyx', [0.7, 0.05, -0.1]).as_matrix(),
                      np.array([3.0, -2.0, 0.5]))
 

@@ -15,7 +15,7 @@ from sgor_ros.io.messages import odometry_of
 from sgor_ros.io.messages import relative_pose
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
-EXAMPLES = sorted((Path(__file__).resolve().parents[1] / 'examples').glob('pose_graph_*.py'))
+EXAMPLES = sorted((Path(__file__).resolve().parents[2] / 'examples').glob('pose_graph_*.py'))
 SCAN_NS, REFERENCE_NS = 1_700_000_000_300_000_000, 1_700_000_000_000_000_000
 DRAWS = 4000
 # of the mean of so many values of chi squared with 6 degrees of freedom

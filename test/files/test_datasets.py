@@ -369,7 +369,7 @@ def test_real_labels_of_rellis_are_all_known(data_folder):
 
 
 def test_the_example_of_the_docs(street, tmp_path, capsys):
-    page = (Path(__file__).resolve().parents[1] / 'docs/data.md').read_text()
+    page = (Path(__file__).resolve().parents[2] / 'docs/data.md').read_text()
     code, = re.findall(r'```python\n(.*?)```', page, re.DOTALL)
     scope = {'path': write_scans(tmp_path / 'park', street[:2])}
     exec(code, scope)
