@@ -13,6 +13,7 @@ from sgor_ros.commands import tables
 
 OUT = Path('out/results')
 QUICK = ['--methods', 'SGOR', 'SC2-PCR', 'SM']
+PICTURED = ('poses_paper', 'matches', 'noise', 'categories')
 HEAD = """# Results
 
 Made by `scripts/results_page.py` from runs of [`sgor_tables`](tables.md) on what little data is at
@@ -33,6 +34,9 @@ def runs(data: Path, drives: Path) -> dict[str, tuple[str, list[str]]]:
                       ['kitti-10m', '--data', str(drives / 'kitti_08b')]),
         'poses': ('KITTI and nuScenes, pairs up to 36 m apart, labels by hand or predicted',
                   [*pairs, '--limit', '24']),
+        'poses_paper': ('The same pairs, matches of `SgorConfig.paper()`', [
+            *pairs, '--limit', '24', '--front-end', 'paper', '--methods', 'SGOR', 'SC2-PCR',
+            'SM', 'RANSAC', 'FGR', "KISS-Matcher's solver"]),
         'sets': ('KITTI, three sets of FPFH matches from elsewhere, no labels',
                  [*sets, '--sets', 'kitti_*']),
         'set_3dmatch': ('3DMatch, one set of matches from elsewhere',
@@ -63,7 +67,7 @@ def main() -> None:
                          if ', printed |' not in line and not line.startswith(('# ', '![')))
         picture = re.search(r'!\[(study|matches)\.png]', page)
         text.append(f'## {title}\n\n{body.strip()}')
-        if picture:
+        if picture and name in PICTURED:
             target = docs / f'images/results_{name}.png'
             shutil.copyfile(folder / f'{picture[1]}.png', target)
             text.append(f'![{title}](images/{target.name})')

@@ -2,6 +2,7 @@
 from argparse import Namespace
 from collections.abc import Callable
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from importlib import import_module
 from pathlib import Path
@@ -83,6 +84,8 @@ def _parser() -> frame.Parser:
         help='repeat for different numbers of matches, categories or random labels; ablation: '
         'rows 1 to 9 of the paper')
     add('--values', type=float, nargs='+', help='of the study')
+    add('--front-end', choices=['protocol', 'paper'], default='protocol',
+        help="who makes the matches: the relatives' voxels and radii, or SgorConfig.paper()")
     add('--features', type=Path, metavar='FOLDER',
         help='NAME.npz for each scan with points (V, 3) and descriptors (V, D)')
     add('--seed', type=int, default=0)
@@ -100,6 +103,8 @@ def _tables(arguments: Namespace) -> int:
                          + (f'; {protocol.missing} in the list, their scans are not there'
                             if protocol.missing else ''))
     protocol = _spread(protocol, arguments.limit)
+    if arguments.front_end == 'paper':
+        protocol = replace(protocol, front_end=SgorConfig.paper())
     if arguments.refine_truth:
         protocol = _with(protocol, refined(protocol.tasks, output / 'truth.json'))
     study = '' if arguments.study == ABLATION else arguments.study
@@ -226,8 +231,7 @@ def _spread(protocol: Protocol, most: int) -> Protocol:
 
 
 def _with(protocol: Protocol, tasks: Sequence[Task]) -> Protocol:
-    return Protocol(protocol.name, tasks, protocol.thresholds, protocol.inlier_m,
-                    protocol.front_end, protocol.missing)
+    return replace(protocol, tasks=tasks)
 
 
 def _say(message: str) -> None:

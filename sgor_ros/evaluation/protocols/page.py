@@ -75,6 +75,6 @@ def _caution(pairs: int) -> str:
     """
     low = pairs / (pairs + Z**2)
     half = 50 * Z / math.sqrt(pairs)
-    return (f'With {pairs} pairs, all of them right is compatible (95 %) with a recall of '
-            f'{100 * low:.0f} %, and a recall about one half is known to {half:.0f} points: '
+    return (f'With {pairs} pair{"s" if pairs > 1 else ""}, all of them right is compatible (95 %) '
+            f'with a recall of {100 * low:.0f} %, and a recall about one half is known to {half:.0f} points: '
             'differences below that say nothing.')

@@ -1,5 +1,6 @@
 """The tables of a protocol, in Markdown and LaTeX, beside the published rows."""
 from collections.abc import Sequence
+import re
 
 import numpy as np
 
@@ -23,14 +24,15 @@ def whole(records: Sequence[Record], protocol: Protocol) -> str:
     """Return all tables of a protocol, and by what rules they are averaged."""
     first = protocol.thresholds[0]
     count = len({r.task for r in records})
-    text = [f'{count} pairs' + (f', {protocol.missing} more in the list whose scans are not here'
-                                if protocol.missing else '') + '. '
+    absent = (f', {protocol.missing} more in the list whose scans are not here'
+              if protocol.missing else '')
+    text = [f'{count} pair{"s" if count > 1 else ""}{absent}. '
             + RULES.format(re=first.rotation_deg, te=100 * first.translation_m,
                            inlier=protocol.inlier_m),
             markdown(*main_rows(records, protocol, first))]
     if len(protocol.thresholds) > 1:
         text.append(markdown(*level_rows(records, protocol)))
-    groups = list(dict.fromkeys(r.group for r in records))
+    groups = sorted({r.group for r in records}, key=_natural)
     if len(groups) > 1:
         text.append(markdown(*group_rows(records, protocol, groups, first)))
     return '\n\n'.join(text)
@@ -119,6 +121,11 @@ def mean(values: Sequence[float], digits: int) -> str:
     """Return the mean of those that are numbers; empty without any."""
     known = [v for v in values if not np.isnan(v)]
     return f'{np.mean(known):.{digits}f}' if known else ''
+
+
+def _natural(name: str) -> list[tuple[int, str]]:
+    """Return what sorts 10-20 m behind 2-5 m."""
+    return [(int(part), '') if part.isdigit() else (-1, part) for part in re.split(r'(\d+)', name)]
 
 
 def _escaped(cell: str) -> str:
