@@ -76,5 +76,5 @@ def _caution(pairs: int) -> str:
     low = pairs / (pairs + Z**2)
     half = 50 * Z / math.sqrt(pairs)
     return (f'With {pairs} pair{"s" if pairs > 1 else ""}, all of them right is compatible (95 %) '
-            f'with a recall of {100 * low:.0f} %, and a recall about one half is known to {half:.0f} points: '
-            'differences below that say nothing.')
+            f'with a recall of {100 * low:.0f} %, and a recall about one half is known to '
+            f'{half:.0f} points: differences below that say nothing.')
