@@ -27,7 +27,7 @@ share; what this package does with two scans is in [figures](figures.md).
 def runs(data: Path, drives: Path) -> dict[str, tuple[str, list[str]]]:
     """Return name of the run to (title, arguments)."""
     pairs = ['poses', '--data', str(data), '--max-distance', '36']
-    ten = [*pairs, '--limit', '10', *QUICK]
+    ten = [*pairs, '--limit', '10', '--front-end', 'paper', *QUICK]
     sets = ['matches', '--data', str(data / 'correspondences')]
     return {
         'kitti_10m': ('KITTI, pairs by the 10 m rule on one drive of 61 scans, no labels',
@@ -46,12 +46,13 @@ def runs(data: Path, drives: Path) -> dict[str, tuple[str, list[str]]]:
                       ['poses', '--data', str(drives / 'courtyard'), '--max-distance', '20',
                        '--limit', '12', '--methods', 'SGOR', 'SC2-PCR', 'SM', 'RANSAC', 'FGR',
                        "KISS-Matcher's solver"]),
-        'matches': ('Study: number of matches', [*ten, '--study', 'matches']),
-        'noise': ('Study: share of random labels', [*ten, '--study', 'noise']),
+        'matches': ('Study: number of matches (of `SgorConfig.paper()`)',
+                    [*ten, '--study', 'matches']),
+        'noise': ('Study: share of random labels (likewise)', [*ten, '--study', 'noise']),
         'categories': ('Study: categories that keep their labels',
                        [*ten, '--study', 'categories']),
         'ablation': ("Rows 1 to 9 of the paper's ablation on shared pairs",
-                     [*pairs, '--limit', '16', '--study', 'ablation'])}
+                     [*pairs, '--limit', '16', '--front-end', 'paper', '--study', 'ablation'])}
 
 
 def main() -> None:

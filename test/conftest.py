@@ -63,3 +63,12 @@ def errors(T, truth):
     delta = np.linalg.inv(truth) @ T
     cosine = np.clip((np.trace(delta[:3, :3]) - 1) / 2, -1, 1)
     return np.linalg.norm(delta[:3, 3]), np.degrees(np.arccos(cosine))
+
+
+@pytest.fixture(scope='module')
+def domain():
+    """Yield a ROS domain that no other test on this machine uses."""
+    from sgor_ros.ros.player import Domain  # only where there is ROS
+    domain = Domain()
+    yield domain
+    domain.close()

@@ -26,12 +26,15 @@ def recall_along(path: Path, records: Sequence[Record], threshold: Threshold, ax
     """Draw RR of each method along the values of a study."""
     figure = new_figure(8, 4.8)
     axes = figure.add_subplot()
-    for place, (method, own) in enumerate(by_method(records).items()):
+    methods = by_method(records)
+    for place, (method, own) in enumerate(methods.items()):
+        # the first are drawn broader: where curves are the same all of them are seen
+        over = len(methods) - 1 - place
         names = list(dict.fromkeys(r.variant for r in own))
         recall = [100 * np.mean([r.within(threshold) for r in own if r.variant == name])
                   for name in names]
         axes.plot([float(name) for name in names], recall, '-', marker=MARKERS[place % 8],
-                  color=COLOURS[place % 8], label=method)
+                  color=COLOURS[place % 8], lw=1.5 + 2 * over, ms=5 + 3 * over, label=method)
     pairs = len({r.task for r in records})
     axes.set(xlabel=axis, ylabel=f'RR %, {pairs} pairs', ylim=(-3, 103))
     axes.legend(loc='center left', bbox_to_anchor=(1.02, 0.5), frameon=False)
