@@ -38,6 +38,7 @@ from ..io.datasets import Drive
 from ..io.datasets import Frame
 from ..io.datasets import open_drives
 from . import frame
+from .benchmarks import inputs
 
 SPEED_M_S = 8.0
 ABLATION = 'ablation'
@@ -109,7 +110,7 @@ def _tables(arguments: Namespace) -> int:
         protocol = _with(protocol, refined(protocol.tasks, output / 'truth.json'))
     study = '' if arguments.study == ABLATION else arguments.study
     entries = _entries(arguments, protocol)
-    _say(f'{protocol.name}: {len(protocol.tasks)} pairs, {len(entries)} methods; {output}')
+    inputs.say(f'{protocol.name}: {len(protocol.tasks)} pairs, {len(entries)} methods; {output}')
     warm_up(protocol.front_end)
     features = None if arguments.features is None else Features(arguments.features)
     records = run(protocol, entries, output, features=features,
@@ -126,10 +127,10 @@ def _entries(arguments: Namespace, protocol: Protocol) -> list[Entry]:
         return [Entry(name, sgor(own.replace(**changes)), own.replace(**changes))
                 for name, changes in rows.items()]
     entries = [Entry('SGOR', sgor(own))]
-    entries += [Entry(name, method) for name, method in rivals(_say).items()]
+    entries += [Entry(name, method) for name, method in rivals(inputs.say).items()]
     if arguments.raw and all(task.matches is None for task in protocol.tasks):
         methods = [on_scans.sgor('SGOR, all of ours, from scans', _everything(protocol)),
-                   *on_scans.rivals(_say).values()]
+                   *on_scans.rivals(inputs.say).values()]
         entries += [Entry(method.name, on_scans=partial(_from_scans, method))
                     for method in methods]
     if arguments.methods:
@@ -170,14 +171,7 @@ def _drives(arguments: Namespace) -> list[Drive]:
         if not drives:
             raise InputError(f'--data {arguments.data}: no drive with poses.txt in it')
         return drives
-    try:
-        from ..world import simulate
-    except ImportError as error:
-        raise InputError(f'the built-in world needs Open3D ({error}): pip install open3d'
-                         ) from error
-    _say(f'building the world, seed {arguments.seed}')
-    return [pairing.drive_of('world', (scan[1:] for scan in simulate(
-        arguments.scans, arguments.seed, speed=SPEED_M_S)))]
+    return [inputs.world_drive(arguments.seed, arguments.scans, SPEED_M_S)]
 
 
 def _kitti_10m(arguments: Namespace) -> Protocol:
@@ -232,10 +226,6 @@ def _spread(protocol: Protocol, most: int) -> Protocol:
 
 def _with(protocol: Protocol, tasks: Sequence[Task]) -> Protocol:
     return replace(protocol, tasks=tasks)
-
-
-def _say(message: str) -> None:
-    print(message, file=sys.stderr, flush=True)
 
 
 PROTOCOLS: dict[str, Callable[[Namespace], Protocol]] = {

@@ -19,7 +19,6 @@ from scipy.spatial.transform import Rotation
 from tqdm import tqdm
 
 from ..core.common import se3
-from ..core.common.settings import InputError
 from ..core.config import SgorConfig
 from ..core.matching.correspondences import given_correspondences
 from ..core.matching.correspondences import match
@@ -29,6 +28,7 @@ from ..core.scan.scan import SemanticScan
 from ..core.solver.graph import consistency_graph
 from .methods import packages
 from .methods import problem
+from .methods.files import read_set
 from .metrics import rotation_error_deg
 from .metrics import translation_error_m
 from .pairs import Pair
@@ -103,12 +103,7 @@ def real_matches(folder: Path) -> Iterator[Matches]:
         name = path.name.removesuffix('_source.txt')
         if name.endswith('_T_target'):
             continue
-        try:
-            source, target, T = (np.loadtxt(path.with_name(f'{name}_{what}.txt'))
-                                 for what in ('source', 'target', 'T_target_source'))
-        except (OSError, ValueError) as error:
-            raise InputError(f'{path.with_name(name)}_*.txt: {error}') from error
-        yield Matches(name, source, target, T)
+        yield Matches(name, *read_set(path.parent, name))
 
 
 def fpfh_matches(pairs: Sequence[Pair], count: int) -> Iterator[Matches]:

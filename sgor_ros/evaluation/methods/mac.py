@@ -17,12 +17,13 @@ from .compatibility import with_values
 from .compatibility import without_diagonal
 from .consensus import best
 from .consensus import refined
+from .problem import INDOOR_M
 from .problem import Matches
 from .problem import Solution
 
 Array = NDArray[np.float64]
 
-INDOOR_M, LEAST_OUTDOOR, LEAST_INDOOR = 0.1, 0.9, 0.99
+LEAST_OUTDOOR, LEAST_INDOOR = 0.9, 0.99
 """Edges need this compatibility, 1 - c^2 / inlier_m^2."""
 MOST_CORE, THINNING = 64, 0.5
 """Where nodes have more neighbours than so many that have as many, there may be more cliques than

@@ -9,7 +9,7 @@ from .problem import Matches
 from .problem import Solution
 
 ITERATIONS = 50_000
-"""Of RANSAC: the number at which PointDSC's and SC2-PCR's tables show it."""
+"""Of RANSAC."""
 
 
 def ransac(matches: Matches) -> Solution:
@@ -17,10 +17,9 @@ def ransac(matches: Matches) -> Solution:
     import open3d as o3d
     registration = o3d.pipelines.registration
     o3d.utility.random.seed(0)
-    pairs = np.repeat(np.arange(len(matches.source))[:, None], 2, axis=1)
     found = registration.registration_ransac_based_on_correspondence(
-        _cloud(matches.source), _cloud(matches.target), o3d.utility.Vector2iVector(pairs),
-        matches.inlier_m, registration.TransformationEstimationPointToPoint(False), 3,
+        *_of_open3d(matches), matches.inlier_m,
+        registration.TransformationEstimationPointToPoint(False), 3,
         [registration.CorrespondenceCheckerBasedOnEdgeLength(0.9),
          registration.CorrespondenceCheckerBasedOnDistance(matches.inlier_m)],
         registration.RANSACConvergenceCriteria(ITERATIONS, 0.999))
@@ -32,10 +31,8 @@ def fast_global(matches: Matches) -> Solution:
     import open3d as o3d
     registration = o3d.pipelines.registration
     o3d.utility.random.seed(0)
-    pairs = np.repeat(np.arange(len(matches.source))[:, None], 2, axis=1)
     found = registration.registration_fgr_based_on_correspondence(
-        _cloud(matches.source), _cloud(matches.target), o3d.utility.Vector2iVector(pairs),
-        registration.FastGlobalRegistrationOption(
+        *_of_open3d(matches), registration.FastGlobalRegistrationOption(
             maximum_correspondence_distance=matches.inlier_m, iteration_number=64,
             maximum_tuple_count=1000))
     return Solution(np.array(found.transformation))
@@ -55,6 +52,10 @@ def kiss_matcher_solver(matches: Matches) -> Solution:
     return Solution(se3.compose(R, np.asarray(solution.translation, np.float64).reshape(3)))
 
 
-def _cloud(points: NDArray[np.float64]) -> Any:
+def _of_open3d(matches: Matches) -> tuple[Any, Any, Any]:
+    """Return both clouds and the pairs of rows, as Open3D takes them."""
     import open3d as o3d
-    return o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
+    source, target = (o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
+                      for points in (matches.source, matches.target))
+    rows = np.repeat(np.arange(len(matches.source))[:, None], 2, axis=1)
+    return source, target, o3d.utility.Vector2iVector(rows)

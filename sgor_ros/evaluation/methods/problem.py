@@ -15,6 +15,10 @@ from ...core.matching.correspondences import given_correspondences
 Array = NDArray[np.float64]
 
 
+INDOOR_M = 0.1
+"""Up to this inlier threshold the settings of the relatives are those for rooms."""
+
+
 @dataclass(frozen=True, eq=False)
 class Matches:
     """Putative matches of two clouds: the same for every method.

@@ -14,6 +14,7 @@ from .compatibility import length_differences
 from .compatibility import with_values
 from .consensus import best
 from .consensus import refined
+from .problem import INDOOR_M
 from .problem import Matches
 from .problem import Solution
 
@@ -23,7 +24,6 @@ LENGTH_LIMIT_M = 0.1
 SEED_SHARE = 0.2
 FIRST, SECOND = 30, 20
 """k_1 and k_2: matches in the two stages of a consensus set."""
-INDOOR_M = 0.1
 ROUNDS_OUTDOOR, ROUNDS_INDOOR = 20, 10
 REFINED_OUTDOOR_M = 1.2
 SEEDS_AT_ONCE = 256

@@ -12,13 +12,13 @@ from ...core.config import SgorConfig
 from ...core.scan.scan import SemanticScan
 from ...io.datasets import Frame
 from ...io.scans import read_scan
+from ..methods.problem import INDOOR_M
 from .task import INDOOR
 from .task import Protocol
 from .task import Task
 
 Array = NDArray[np.float64]
 
-INLIER_M = 0.1
 MILLIMETRE = 1e-3
 MOST_DEPTH_M = 6.0
 
@@ -47,7 +47,7 @@ def threedmatch(folder: Path, logs: str = '*gt.log') -> Protocol:
                                   _fragment(target), T))
             else:
                 missing += 1
-    return Protocol('3dmatch', tasks, (INDOOR,), INLIER_M, SgorConfig.indoor().paper_steps(),
+    return Protocol('3dmatch', tasks, (INDOOR,), INDOOR_M, SgorConfig.indoor().paper_steps(),
                     missing)
 
 
@@ -82,7 +82,7 @@ def depth_frames(folder: Path, stride: int) -> Protocol:
         name = f'{folder.name} {source.name[6:12]} {target.name[6:12]}'
         tasks.append(Task(name, folder.name, _depth(source, K), _depth(target, K),
                           se3.inverse(T_i) @ T_j))
-    return Protocol('depth_frames', tasks, (INDOOR,), INLIER_M,
+    return Protocol('depth_frames', tasks, (INDOOR,), INDOOR_M,
                     SgorConfig.indoor().paper_steps())
 
 
