@@ -24,6 +24,8 @@ LOOSE_M = 0.5
 """
 ROUGH_COVARIANCE = np.diag([0.5**2] * 3 + [0.03**2] * 3)
 """How far off a placement may be before it has been refined on the clouds."""
+DEPENDENT = 1e-9
+"""Directions with less than this share of the largest singular value are combinations of others."""
 UNKNOWN_COVARIANCE = np.diag([0.1**2] * 3 + [0.01**2] * 3)
 """Of a placement that comes without one, where it has to be compared with a prediction."""
 
@@ -149,14 +151,19 @@ def _is_loose(placement: Placement) -> bool:
 def _information(placement: Placement, besides: Array | float = 0.0) -> Array:
     """Return the (6, 6) information of a placement: nothing along its free directions.
 
-    `besides` is added to its covariance.
+    `besides` is added to its covariance. Never negative, whatever the directions are: they are
+    projected out of a square root of the information.
     """
     covariance = UNKNOWN_COVARIANCE if placement.covariance is None else placement.covariance
-    information = np.linalg.inv(covariance + besides)
+    root = np.linalg.inv(np.linalg.cholesky(covariance + besides))    # root^T root: information
     if len(placement.degenerate):
-        along = information @ placement.degenerate.T
-        information -= along @ np.linalg.solve(placement.degenerate @ along, along.T)
-    return np.asarray(information + information.T) / 2
+        free = root @ placement.degenerate.T
+        # its length says nothing, so directions in metres and radians weigh alike
+        spanning, sizes, _ = np.linalg.svd(free / np.linalg.norm(free, axis=0),
+                                           full_matrices=False)
+        spanning = spanning[:, sizes > DEPENDENT * sizes[0]]
+        root = root - spanning @ (spanning.T @ root)
+    return np.asarray(root.T @ root)
 
 
 def _along(degenerate: Array) -> str:

@@ -1,11 +1,13 @@
 """The way of a scan through the tracker, on one screen."""
 from dataclasses import dataclass
 from dataclasses import replace
+import logging
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..core.common import se3
+from ..core.common.settings import InputError
 from ..core.config import SgorConfig
 from ..core.confirmation import confirm
 from ..core.registration import register
@@ -29,6 +31,8 @@ from .stamps import Arrival
 from .stamps import Stamps
 
 Array = NDArray[np.float64]
+
+LOGGER = logging.getLogger('sgor_ros')
 
 
 @dataclass(eq=False)
@@ -91,6 +95,19 @@ class Tracker:
             warnings = [f'time ran backwards by {(before_ns - stamp_ns) * 1e-9:.3f} s: a new '
                         'track begins']
             self._forget()
+        before = vars(self).copy()
+        try:
+            return self._process(scan, stamp_ns, warnings)
+        except InputError:
+            raise
+        except Exception as error:
+            # a robot depends on this process: no cloud may end it, and the next one is another
+            LOGGER.exception('scan at %.3f s: fault of the program', stamp_ns * 1e-9)
+            vars(self).update(before)
+            return self._fault(stamp_ns, warnings, error)
+
+    def _process(self, scan: SemanticScan, stamp_ns: int, warnings: list[str]) -> TrackedScan:
+        """Find the pose of a scan that is on time."""
         prepared = preprocess(
             scan, self.config,
             scale_before=self._reference.prepared.scale if self._reference else None)
@@ -120,6 +137,16 @@ class Tracker:
             stamp_ns, False, f'stamp {stamp_ns * 1e-9:.3f} s is not after the last, '
             f'{(self._stamps.newest_ns or 0) * 1e-9:.3f} s', None, None, None, None, None, False,
             False, (), {}, State.LATE, self._track_id, failures=self._failures, late=self._late)
+
+    def _fault(self, stamp_ns: int, warnings: list[str], error: Exception) -> TrackedScan:
+        """Count a scan that an exception ended as one without a pose."""
+        self._failures += 1
+        lost = self._failures >= self.tracker_config.max_failures
+        return TrackedScan(
+            stamp_ns, False, f'fault of the program: {type(error).__name__}: {error}', None, None,
+            None, None, None, False, False, tuple(warnings), {},
+            State.LOST if lost else State.FAILED, self._track_id, failures=self._failures,
+            late=self._late)
 
     def _begin(self, new: _Scan) -> TrackedScan:
         """Make the scan the origin of a new track, if something can be registered to it."""

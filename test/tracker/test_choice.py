@@ -16,7 +16,10 @@ from sgor_ros import Tracker
 from sgor_ros import TrackerConfig
 from sgor_ros.core.common import se3
 from sgor_ros.core.result import Placement
+from sgor_ros.core.trust.degeneracy import directions
+from sgor_ros.core.trust.degeneracy import Slide
 from sgor_ros.tracker import tracker as tracker_module
+from sgor_ros.tracker.choice import _information
 from sgor_ros.tracker.choice import choose as choose_refined
 from sgor_ros.tracker.choice import refined
 from sgor_ros.tracker.choice import Step
@@ -237,3 +240,91 @@ def test_through_a_tunnel_the_covariance_says_what_is_not_known(monkeypatch, mod
     assert (np.diff(along[5:80]) > 0).all()
     assert along[79] > 5.0
     assert (along[80:] > 5.0).all(), 'where it is since the start is not known again by leaving'
+
+
+def twists_of_any_kind(rng):
+    """Return free directions as they come of clouds, or worse: shifts and turns, any number."""
+    count = rng.integers(1, 7)
+    twists = rng.normal(size=(count, 6))
+    kind = rng.integers(5)
+    if kind == 0:    # shifts in one plane
+        twists[:, 2:] = 0
+    elif kind == 1:    # nearly one line
+        twists = twists[:1] + 10.0**rng.uniform(-17, -1) * rng.normal(size=(count, 6))
+    elif kind == 2:    # turns only
+        twists[:, :3] = 0
+    elif kind == 3:    # some twice
+        twists = twists[rng.integers(count, size=count)]
+    twists[:, 3:] /= 10.0**rng.uniform(-1, 2)
+    return twists
+
+
+def test_whatever_the_free_directions_are_the_information_is_one(driving):
+    """Never an exception, nothing negative, and nothing along what is free."""
+    rng = np.random.default_rng(0)
+    motion, stamp_ns = driving
+    prediction = motion.predict(stamp_ns, CONFIG)
+    for _ in range(20000):
+        twists = twists_of_any_kind(rng)
+        root = rng.normal(size=(6, 6)) * np.repeat((0.05, 0.003), 3)[:, None]
+        covariance = root @ root.T + np.diag([1e-8] * 3 + [1e-10] * 3)
+        free = twists / np.linalg.norm(twists, axis=1, keepdims=True)
+        information = _information(Placement(np.eye(4), covariance, free, {}))
+        values = np.linalg.eigvalsh(information)
+        assert values[0] > -1e-9 * values[-1]
+        along = np.einsum('ki,ij,kj->k', free, information, free)
+        full = np.einsum('ki,ij,kj->k', free, np.linalg.inv(covariance), free)
+        assert (along <= 1e-6 * full + 1e-9).all()
+        T = pose(*rng.uniform(-5, 5, 3), rng.uniform(-3, 3))
+        assert prediction.distance(T, information) >= 0
+        fused = prediction.fuse(T, information)
+        assert np.linalg.eigvalsh(fused.pose_covariance)[0] > -1e-9
+
+
+def test_directions_that_leave_degeneracy_are_independent():
+    rng = np.random.default_rng(1)
+    for _ in range(2000):
+        lever = 10.0**rng.uniform(0, 2)
+        slides = tuple(Slide(twist, 1.0, lever) for twist in twists_of_any_kind(rng))
+        found = directions(slides)
+        assert 1 <= len(found) <= 6
+        np.testing.assert_allclose(np.linalg.norm(found, axis=1), 1)
+        metric = found * np.repeat((1.0, lever), 3)
+        metric /= np.linalg.norm(metric, axis=1, keepdims=True)
+        assert np.linalg.svd(metric)[1][-1] > 1e-4
+    three = [np.array([np.cos(a), np.sin(a), 0, 0, 0, 0]) for a in (0.0, 1.0, 2.0)]
+    found = directions(tuple(Slide(twist, 1.0, 10.0) for twist in three))
+    np.testing.assert_allclose(found, three[:2])
+
+
+def test_two_clouds_of_heavy_rain_end_no_track(data_folder):
+    """The free directions of their registration lay in one plane."""
+    with np.load(data_folder / 'faults/rain40_two_clouds.npz') as file:
+        clouds = [file[name] for name in file]
+    tracker = Tracker()
+    for k, cloud in enumerate(clouds):
+        tracked = tracker.track(SemanticScan(cloud[:, :3]), (k + 1) * PERIOD_NS)
+        assert 'fault' not in tracked.reason
+    assert tracked.registration is not None
+    assert tracked.success or tracked.reason
+
+
+def test_a_fault_of_the_program_costs_one_scan(street, monkeypatch, caplog):
+    tracker = Tracker()
+    scans = [SemanticScan(points, labels) for points, labels, _ in street]
+    assert tracker.track(scans[0], PERIOD_NS).success
+
+    def fail(*_, **__):
+        raise np.linalg.LinAlgError('Singular matrix')
+    with monkeypatch.context() as patch:
+        patch.setattr(tracker_module, 'register', fail)
+        failed = tracker.track(scans[1], 2 * PERIOD_NS)
+    assert not failed.success
+    assert failed.state is State.FAILED
+    assert failed.failures == 1
+    assert failed.reason == 'fault of the program: LinAlgError: Singular matrix'
+    assert 'Traceback' in caplog.text
+    after = tracker.track(scans[2], 3 * PERIOD_NS)
+    assert after.success
+    assert after.failures == 0
+    assert errors(after.T_odom_sensor, relative(street[0][2], street[2][2]))[0] < 0.1

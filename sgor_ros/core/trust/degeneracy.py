@@ -28,6 +28,8 @@ how far it goes on, and where to."""
 
 CROOKED = 0.01
 """What is slid along is straight to this share of the way: so far off may the rest be."""
+INDEPENDENT = 0.1
+"""Sine of the least angle between a direction and the span of those before it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,10 +125,21 @@ def inflate(covariance: NDArray[np.float64], slides: tuple[Slide, ...]) -> NDArr
 
 
 def directions(slides: tuple[Slide, ...]) -> NDArray[np.float64]:
-    """Return the slides as unit directions, (K, 6)."""
-    twists = np.array([slide.twist for slide in slides]).reshape(-1, 6)
-    unit: NDArray[np.float64] = twists / np.linalg.norm(twists, axis=1, keepdims=True)
-    return unit
+    """Return the slides as unit directions, (K, 6), without those that lie in the span of others.
+
+    Three shifts may have been laid into one plane, the ground; two may have ended as the same.
+    """
+    kept: list[NDArray[np.float64]] = []
+    span = np.empty((0, 6))    # orthonormal, rotations as metres at the lever
+    for slide in slides:
+        metric = slide.twist * np.repeat((1.0, slide.lever), 3)
+        metric = metric / np.linalg.norm(metric)
+        beyond = metric - span.T @ (span @ metric)
+        if np.linalg.norm(beyond) < INDEPENDENT:
+            continue
+        span = np.vstack((span, beyond / np.linalg.norm(beyond)))
+        kept.append(slide.twist / np.linalg.norm(slide.twist))
+    return np.array(kept).reshape(-1, 6)
 
 
 def in_words(slides: tuple[Slide, ...]) -> str:
