@@ -17,14 +17,14 @@ from sgor_ros import preprocess
 from sgor_ros import register
 from sgor_ros import SemanticScan
 from sgor_ros.core.common import se3
+from sgor_ros.core.degeneracy.directions import perturbed_poses
+from sgor_ros.core.hypotheses.map_correlation import correlate_maps
+from sgor_ros.core.icp.point_to_plane import icp
 from sgor_ros.core.scan.voxels import thin
-from sgor_ros.core.trust.correlation import correlated
-from sgor_ros.core.trust.degeneracy import pushed
-from sgor_ros.core.trust.evidence import AGREE
-from sgor_ros.core.trust.evidence import CONTRADICT
-from sgor_ros.core.trust.evidence import evidence_of
-from sgor_ros.core.trust.evidence import testify
-from sgor_ros.core.trust.icp import icp
+from sgor_ros.core.scoring.pose_scoring import AGREES
+from sgor_ros.core.scoring.pose_scoring import pose_score
+from sgor_ros.core.scoring.pose_scoring import score_keypoints
+from sgor_ros.core.scoring.pose_scoring import VIOLATES
 from sgor_ros.io.colours import SOURCE
 from sgor_ros.io.colours import STRANGE
 from sgor_ros.io.colours import TARGET
@@ -98,7 +98,8 @@ def tunnel() -> Example:
     source, target, T_world_target = pair_of('tunnel', 3)
     found = register(source, target)
     slide = SLID_M * found.alternatives[0].degenerate[:1]
-    slid = icp(source.view, target.view, pushed(found.T_target_source, slide), ROUNDS, ROUNDS)
+    slid = icp(source.index, target.index, perturbed_poses(found.T_target_source, slide), ROUNDS,
+               ROUNDS)
     return Example(source, target, T_world_target, found.T_target_source, slid[0],
                    _middle(T_world_target, found.T_target_source, slid[0]))
 
@@ -116,11 +117,11 @@ def courtyard() -> Example:
     """Return a courtyard of one design on all sides, and the rival with most agreement."""
     source, target, T_world_target = pair_of('courtyard', 1)
     found = register(source, target)
-    rivals = icp(source.view, target.view, correlated(
-        source.view, target.view, found.T_target_source, 30.0), ROUNDS, ROUNDS)
+    rivals = icp(source.index, target.index, correlate_maps(
+        source.index, target.index, found.T_target_source, 30.0), ROUNDS, ROUNDS)
     turned = [se3.angle(T[:3, :3] @ found.T_target_source[:3, :3].T) > 0.1 for T in rivals]
-    said = testify(source.view, target.view, rivals, ASKED)
-    best = int(np.argmax((said == AGREE).sum(axis=1) * turned))
+    said = score_keypoints(source.index, target.index, rivals, ASKED)
+    best = int(np.argmax((said == AGREES).sum(axis=1) * turned))
     return Example(source, target, T_world_target, found.T_target_source, rivals[best], (0.0, 0.0))
 
 
@@ -141,14 +142,14 @@ def draw(axes: Any, example: Example, T: Array, width: float) -> None:
         placed = se3.transform(pose, shown.astype(np.float64))
         axes.scatter(*placed[:, :2].T, s=1.6, color=colour, alpha=0.55, linewidths=0,
                      rasterized=True)
-    outcomes = testify(source.view, target.view, T[None], ASKED)[0]
-    asked = [se3.transform(pose, scan.view.points[thin(len(scan.view.points), ASKED)])
+    outcomes = score_keypoints(source.index, target.index, T[None], ASKED)[0]
+    asked = [se3.transform(pose, scan.index.points[thin(len(scan.index.points), ASKED)])
              for scan, pose in ((source, W @ T), (target, W))]
-    against = np.vstack(asked)[outcomes == CONTRADICT]
+    against = np.vstack(asked)[outcomes == VIOLATES]
     axes.plot(*against[:, :2].T, 'o', color=STRANGE, ms=3.2, mew=0)
     for pose, colour in ((W, TARGET), (W @ T, SOURCE)):
         axes.plot(*pose[:2, 3], 'o', ms=9, mfc='white', mec=colour, mew=2.5, zorder=5)
-    found = evidence_of(outcomes)
+    found = pose_score(outcomes)
     axes.set_xlabel(f'{found.agree:.0%} agree, {found.contradict:.1%} contradict', fontsize=11)
     half = width / 2 * np.array((-1, 1))
     x, y = example.middle

@@ -1,5 +1,6 @@
 """`sgor_register`: two scans from files, the transformation between them."""
 from argparse import Namespace
+from dataclasses import asdict
 from dataclasses import replace
 import json
 import math
@@ -14,10 +15,10 @@ from .. import visualize
 from ..core.common import se3
 from ..core.common.settings import InputError
 from ..core.config import SgorConfig
+from ..core.preprocessing import preprocess
 from ..core.registration import register
-from ..core.result import Registration
-from ..core.scan.preprocessing import preprocess
 from ..core.scan.scan import SemanticScan
+from ..core.verdict.result import Registration
 from ..core.warmup import warm_up
 from ..io.plots import PICTURES
 from ..io.plots import plot_registration
@@ -141,7 +142,8 @@ def _as_dict(result: Registration, arguments: Namespace) -> dict[str, Any]:
     T, covariance = result.T_target_source, result.covariance
     return {
         'source': str(arguments.source), 'target': str(arguments.target),
-        'success': result.success, 'reason': result.reason, 'confidence': result.confidence,
+        'success': result.success, 'status': result.status.value, 'reason': result.reason,
+        'confidence': result.confidence,
         # a refused candidate is nothing to build on; one of several, or one that slides, may be
         'T_target_source': T.tolist() if T is not None and (
             result.success or len(result.degenerate) or result.alternatives) else None,
@@ -149,8 +151,8 @@ def _as_dict(result: Registration, arguments: Namespace) -> dict[str, Any]:
         'degenerate': result.degenerate.tolist(),
         'alternatives': [other.T_target_source.tolist() for other in result.alternatives],
         'correspondences': len(result.inliers), 'inliers': int(result.inliers.sum()),
-        'evidence': result.evidence, 'warnings': list(result.warnings),
-        'timings_s': result.timings}
+        'score': None if result.score is None else asdict(result.score),
+        'warnings': list(result.warnings), 'timings_s': result.timings}
 
 
 def _plot(arguments: Namespace, source: SemanticScan, target: SemanticScan,

@@ -1,5 +1,6 @@
-"""SGOR on one screen: `register` two scans, `solve` for the transformation of matches."""
+"""SGOR on one screen: `register` two scans, or what is behind matches from elsewhere."""
 from collections.abc import Iterator
+from dataclasses import dataclass
 from dataclasses import replace
 from functools import partial
 
@@ -7,43 +8,54 @@ import numpy as np
 from numpy.typing import ArrayLike
 from numpy.typing import NDArray
 
-from .alignment import align
-from .alignment import Alignment
-from .common.stopwatch import Stopwatch
-from .common.tasks import at_once
-from .common.threads import cores
 from .config import SgorConfig
-from .matching.correspondences import Correspondences
+from .execution.stopwatch import Stopwatch
+from .execution.tasks import run_both
+from .execution.threads import cores
+from .hypotheses.competing import compete
+from .hypotheses.competing import HypothesisTest
+from .icp.gicp import align
+from .icp.gicp import Alignment
 from .matching.correspondences import given_correspondences
 from .matching.correspondences import match
 from .matching.correspondences import overlap_region
-from .result import Registration
-from .scan.preprocessing import at_scale
-from .scan.preprocessing import preprocess
-from .scan.scan import as_scan
-from .scan.scan import PreparedScan
+from .prepared_scan import as_scan
+from .prepared_scan import PreparedScan
+from .preprocessing import at_scale
+from .preprocessing import preprocess
 from .scan.scan import SemanticScan
-from .solver.consistency import filter_groups
-from .solver.graph import consistency_graph
-from .solver.grouping import group
-from .solver.hypotheses import hypothesise
-from .solver.hypotheses import MIN_POINTS
-from .solver.refinement import distances
-from .solver.refinement import refine
-from .solver.refinement import unobservable
+from .scoring.pose_scoring import pose_score
+from .scoring.pose_scoring import PoseScore
+from .solver.solution import Solution
+from .solver.solution import solve
 from .solver.verification import Normals
-from .solver.verification import verify
-from .trust.acceptance import compete
-from .trust.acceptance import judge_matches
-from .trust.acceptance import settle
-from .trust.hints import frame_hint
-from .trust.hints import scale_hint
-from .trust.rivals import Contest
-from .trust.view import View
+from .verdict.decision import decide
+from .verdict.decision import decide_by_matches
+from .verdict.decision import low_confidence
+from .verdict.decision import no_solution
+from .verdict.decision import Pair
+from .verdict.decision import refuse
+from .verdict.hints import frame_hint
+from .verdict.hints import scale_hint
+from .verdict.result import Registration
+
+Scan = SemanticScan | PreparedScan
 
 
-def register(source: SemanticScan | PreparedScan | ArrayLike,
-             target: SemanticScan | PreparedScan | ArrayLike,
+@dataclass(frozen=True, eq=False)
+class Attempt:
+    """What one way to match two scans led to; `test` is None without a solution."""
+
+    solution: Solution
+    test: HypothesisTest | None
+
+    @property
+    def score(self) -> PoseScore:
+        """That of the pose; nothing speaks for one that is not there."""
+        return PoseScore(0.0, 0.0) if self.test is None else pose_score(self.test.outcomes)
+
+
+def register(source: Scan | ArrayLike, target: Scan | ArrayLike,
              config: SgorConfig | None = None) -> Registration:
     """Find the transformation between two overlapping scans, without an initial guess.
 
@@ -58,7 +70,7 @@ def register(source: SemanticScan | PreparedScan | ArrayLike,
     Returns
     -------
     Registration
-        With ``success=False`` and a reason where the scans cannot be registered.
+        Where the scans cannot be registered its `status` and `reason` say why.
 
     Raises
     ------
@@ -67,61 +79,58 @@ def register(source: SemanticScan | PreparedScan | ArrayLike,
     """
     config = SgorConfig.given(config)
     scans = as_scan(source, 'source'), as_scan(target, 'target')
-    with cores(config.threads):
-        return _register(*scans, config)
-
-
-def _register(one: SemanticScan | PreparedScan, other: SemanticScan | PreparedScan,
-              config: SgorConfig) -> Registration:
     clock = Stopwatch()
+    with cores(config.threads):
+        one, other = _prepared(*scans, config, clock)
+        config = config.scaled(one.scale)
+        found = _best_attempt(one, other, config, clock)
+        pair = Pair(one, other, found.solution.correspondences.source,
+                    found.solution.correspondences.target, found.solution, clock.seconds)
+        if found.test is None:
+            result = no_solution(pair, config)
+        elif found.score.confidence < config.min_confidence:
+            result = refuse(pair, found.test, low_confidence(found.score, config), config)
+        else:
+            alignment = aligned(one, other, found.test.T_target_source, config, clock)
+            with clock('verdict'):
+                result = decide(pair, found.test, alignment, config)
+        hints = _hints(result, one, other, config)
+    return replace(result, warnings=(*result.warnings, *hints)) if hints else result
+
+
+def _prepared(one: Scan, other: Scan, config: SgorConfig, clock: Stopwatch
+              ) -> tuple[PreparedScan, PreparedScan]:
+    """Return both scans prepared, at one scale."""
+    def prepare(scan: Scan) -> PreparedScan:
+        return scan if isinstance(scan, PreparedScan) else preprocess(scan, config)
+
     with clock('preprocessing'):
-        source, target = at_once(config.threads, partial(_prepared, one, config),
-                                 partial(_prepared, other, config))
+        source, target = run_both(config.threads, partial(prepare, one), partial(prepare, other))
         if source.scale != target.scale:    # the coarser one costs less and sees farther
-            source, target = (at_scale(scan, max(source.scale, target.scale))
-                              for scan in (source, target))
-    config = config.scaled(source.scale)
+            scale = max(source.scale, target.scale)
+            source, target = at_scale(source, scale), at_scale(target, scale)
+    return source, target
+
+
+def _best_attempt(source: PreparedScan, target: PreparedScan, config: SgorConfig,
+                  clock: Stopwatch) -> Attempt:
+    """Return the first attempt that the clouds believe; where they believe none, the best."""
     labelled = all(scan.features.labelled_share > 0 for scan in (source, target))
     doubtful = source.scale < 1 and any(
         scan.ground is None or scan.ground.source == 'geometry' for scan in (source, target))
-    for attempt in _attempts(config, labelled=labelled, level=not doubtful):
-        result, contest = _globally(source, target, attempt, clock)
-        if result.success:
-            break
-    if result.success and contest is not None:
-        result = _locally(result, contest, source, target, config, clock)
-    result = with_grounds(result, source, target)
-    return replace(result, warnings=(*result.warnings, *_hints(result, source, target, config)))
-
-
-def _prepared(scan: SemanticScan | PreparedScan, config: SgorConfig) -> PreparedScan:
-    return scan if isinstance(scan, PreparedScan) else preprocess(scan, config)
-
-
-def with_grounds(result: Registration, source: PreparedScan, target: PreparedScan
-                 ) -> Registration:
-    """Add what is known of the two scans: their grounds, and what was odd about them."""
-    warnings = (*(f'source: {w}' for w in source.warnings),
-                *(f'target: {w}' for w in target.warnings))
-    labelled = (source.features.labelled_share > 0, target.features.labelled_share > 0)
-    if any(labelled) and not all(labelled):
-        warnings += (f'labels ignored: the {"target" if labelled[0] else "source"} has none',)
-    return replace(result, source_ground=source.ground, target_ground=target.ground,
-                   warnings=warnings)
-
-
-def _hints(result: Registration, source: PreparedScan, target: PreparedScan,
-           config: SgorConfig) -> tuple[str, ...]:
-    """Return what may be wrong with the scans."""
-    hints = [scale_hint(result, config)]
-    if not result.success:
-        hints += [f'{side}: {hint}' for side, scan in (('source', source), ('target', target))
-                  if (hint := frame_hint(scan.scan.points, config))]
-    return tuple(filter(None, hints))
+    best: Attempt | None = None
+    for way in _attempts(config, labelled=labelled, level=not doubtful):
+        found = _attempt(source, target, way, clock)
+        if found.test is not None and found.score.confidence >= config.min_confidence:
+            return found
+        if best is None or found.score.confidence >= best.score.confidence:
+            best = found
+    assert best is not None
+    return best
 
 
 def _attempts(config: SgorConfig, *, labelled: bool, level: bool) -> Iterator[SgorConfig]:
-    """Yield the settings of each attempt; the first that the clouds believe ends them.
+    """Yield the settings of each attempt.
 
     A quick one with few keypoints; one with all; one that trusts less: without labels, or, where
     there are none, without what stands around, which from afar looks another. Where the ground
@@ -146,57 +155,49 @@ def _attempts(config: SgorConfig, *, labelled: bool, level: bool) -> Iterator[Sg
     yield from ways[1:]
 
 
-def _globally(source: PreparedScan, target: PreparedScan, config: SgorConfig,
-              clock: Stopwatch) -> tuple[Registration, Contest | None]:
-    """Match, solve, and let the clouds choose among the answer and its rivals."""
+def _attempt(source: PreparedScan, target: PreparedScan, config: SgorConfig, clock: Stopwatch
+             ) -> Attempt:
+    """Match, solve, and let the clouds choose among the solution and what competes with it."""
     p, q = source.features, target.features
     with clock('descriptors'):
         # made by the first attempt that needs them, and kept
-        at_once(config.threads, lambda: p.descriptors, lambda: q.descriptors)
+        run_both(config.threads, lambda: p.descriptors, lambda: q.descriptors)
     if config.context_weight > 0:
         with clock('context'):
-            at_once(config.threads, lambda: p.context, lambda: q.context)
+            run_both(config.threads, lambda: p.context, lambda: q.context)
     with clock('matching'):
         if config.correspondence_preprocessing and config.semantics != 'none':
             p, q = overlap_region(p, q)
         correspondences = match(p, q, config)
     normals = (None if source.ground is None or target.ground is None
                else (source.ground.normal, target.ground.normal))
-    result = solve(correspondences, normals, (source.view, target.view), config, clock)
-    with clock('rivals'):
-        return compete(result, source.view, target.view, config)
-
-
-def _locally(result: Registration, contest: Contest, source: PreparedScan, target: PreparedScan,
-             config: SgorConfig, clock: Stopwatch) -> Registration:
-    """Refine on the clouds, and judge again beside the rivals (beyond the paper)."""
-    assert result.T_target_source is not None
-    local = aligned(source, target, result.T_target_source, config, clock)
-    return settled(result, local, contest, source, target, config, clock)
+    solution = solve(correspondences, normals, (source.index, target.index), config, clock)
+    if solution.T_target_source is None:
+        return Attempt(solution, None)
+    with clock('competing hypotheses'):
+        return Attempt(solution, compete(source.index, target.index, solution.T_target_source,
+                                         solution.ranked_hypotheses, config))
 
 
 def aligned(source: PreparedScan, target: PreparedScan, T_target_source: NDArray[np.float64],
             config: SgorConfig, clock: Stopwatch) -> Alignment | None:
     """Refine a transformation on the clouds; None where that is off or they are too small."""
     with clock('surface'):
-        p, q = at_once(config.threads, source.surfaced, target.surfaced)
+        p, q = run_both(config.threads, source.surfaced, target.surfaced)
     if p is None or q is None:
         return None
     with clock('alignment'):
         return align(p, q, T_target_source, config)
 
 
-def settled(result: Registration, local: Alignment | None, contest: Contest,
-            source: PreparedScan, target: PreparedScan, config: SgorConfig, clock: Stopwatch
-            ) -> Registration:
-    """Take the refined transformation, and judge it beside the rivals."""
-    if local is not None:
-        agree = distances(local.T_target_source, result.source_points,
-                          result.target_points) < config.tau_1
-        result = replace(result, T_target_source=local.T_target_source,
-                         covariance=local.covariance, systematic=local.systematic, inliers=agree)
-    with clock('acceptance'):
-        return settle(result, contest, source.view, target.view, config)
+def _hints(result: Registration, source: PreparedScan, target: PreparedScan,
+           config: SgorConfig) -> tuple[str, ...]:
+    """Return what may be wrong with the scans."""
+    hints = [scale_hint(result, config)]
+    if not result.success:
+        hints += [f'{side}: {hint}' for side, scan in (('source', source), ('target', target))
+                  if (hint := frame_hint(scan.scan.points, config))]
+    return tuple(filter(None, hints))
 
 
 def register_correspondences(source_points: ArrayLike, target_points: ArrayLike,
@@ -222,40 +223,9 @@ def register_correspondences(source_points: ArrayLike, target_points: ArrayLike,
         Shapes that do not fit, or values that are not finite.
     """
     config = SgorConfig.given(config)
+    clock = Stopwatch()
     with cores(config.threads):
         correspondences = given_correspondences(source_points, target_points, source_labels,
                                                 target_labels, config)
-        result = solve(correspondences, ground_normals, None, config, Stopwatch())
-        return judge_matches(result, config)
-
-
-def solve(correspondences: Correspondences, ground_normals: Normals | None,
-          views: tuple[View, View] | None, config: SgorConfig, clock: Stopwatch) -> Registration:
-    """Remove outliers by semantic-geometric consistency and fit (Sec. III-B to III-E)."""
-    found = Registration(False, '', None, correspondences.source, correspondences.target,
-                         np.zeros(len(correspondences), np.bool_), timings=clock.seconds)
-    if len(correspondences) < MIN_POINTS:
-        return replace(found, reason=f'only {len(correspondences)} correspondences')
-    with clock('consistency graph'):
-        graph = consistency_graph(correspondences, config)
-    with clock('grouping'):
-        groups = group(correspondences, graph, config)
-    with clock('consistency'):
-        filtered = filter_groups(correspondences, graph, groups, config.group_keep,
-                                 config.semantics)
-    with clock('hypotheses'):
-        hypotheses = hypothesise(correspondences, filtered)
-    with clock('verification'):
-        verdict = verify(hypotheses, correspondences, ground_normals, views, config)
-    found = replace(found, hypotheses=hypotheses.T_target_source,
-                    passed_ground_check=verdict.passed_ground_check, best_hypothesis=verdict.best,
-                    hypothesis_scores=verdict.score)
-    if verdict.best < 0:
-        return replace(found, reason=verdict.reason)
-    with clock('refinement'):
-        T = refine(hypotheses.T_target_source[verdict.best], correspondences, config)
-        agree = distances(T, correspondences.source, correspondences.target) < config.tau_1
-    reason = unobservable(correspondences.source[agree], correspondences.target[agree], config)
-    if reason:
-        return replace(found, reason=reason, inliers=agree)
-    return replace(found, success=True, T_target_source=T, inliers=agree)
+        solution = solve(correspondences, ground_normals, None, config, clock)
+        return decide_by_matches(solution, config, clock.seconds)

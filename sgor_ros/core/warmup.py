@@ -14,13 +14,13 @@ import threading
 import numpy as np
 from numpy.typing import NDArray
 
-from .common.compiling import loading_only
-from .common.compiling import NotCompiledError
-from .common.compiling import tell
 from .config import SgorConfig
+from .execution.compiling import loading_only
+from .execution.compiling import NotCompiledError
+from .execution.compiling import tell
+from .preprocessing import preprocess
 from .registration import register
 from .registration import register_correspondences
-from .scan.preprocessing import preprocess
 from .scan.scan import SemanticScan
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.common import se3
-from ..core.result import Registration
+from ..core.verdict.result import Registration
 
 Array = NDArray[np.float64]
 Points = NDArray[np.float32]

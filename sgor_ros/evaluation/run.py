@@ -18,8 +18,8 @@ from tqdm import tqdm
 
 from ..core.common import se3
 from ..core.config import SgorConfig
+from ..core.preprocessing import preprocess
 from ..core.registration import register
-from ..core.scan.preprocessing import preprocess
 from ..core.scan.scan import SemanticScan
 from .metrics import rotation_error_deg
 from .metrics import squared_normalised_error

@@ -22,8 +22,8 @@ from ..core.common import se3
 from ..core.config import SgorConfig
 from ..core.matching.correspondences import given_correspondences
 from ..core.matching.correspondences import match
+from ..core.preprocessing import preprocess
 from ..core.registration import register_correspondences
-from ..core.scan.preprocessing import preprocess
 from ..core.scan.scan import SemanticScan
 from ..core.solver.graph import consistency_graph
 from .methods import packages

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from ..core.common import se3
-from ..core.result import Registration
+from ..core.verdict.result import Registration
 from ..tracker import TrackedScan
 from .pointcloud2 import encode
 

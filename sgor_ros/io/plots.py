@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from ..core.common import se3
 from ..core.common.settings import InputError
-from ..core.result import Registration
 from ..core.scan.ground import Ground
 from ..core.scan.scan import SemanticScan
+from ..core.verdict.result import Registration
 from .colours import INLIER
 from .colours import REJECTED
 from .colours import SOURCE

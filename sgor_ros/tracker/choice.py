@@ -6,11 +6,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.alignment import align
 from ..core.config import SgorConfig
-from ..core.result import Placement
-from ..core.result import Registration
-from ..core.scan.scan import PreparedScan
+from ..core.icp.gicp import align
+from ..core.prepared_scan import PreparedScan
+from ..core.verdict.result import Placement
+from ..core.verdict.result import Registration
+from ..core.verdict.result import Status
 from .config import TrackerConfig
 from .covariance import square_root
 from .motion import GATE
@@ -25,7 +26,7 @@ LOOSE_M = 0.5
 ROUGH_COVARIANCE = np.diag([0.5**2] * 3 + [0.03**2] * 3)
 """How far off a placement may be before it has been refined on the clouds."""
 DEPENDENT = 1e-9
-"""Directions with less than this share of the largest singular value are combinations of others."""
+"""Directions below this share of the largest singular value are combinations of others."""
 UNKNOWN_COVARIANCE = np.diag([0.1**2] * 3 + [0.01**2] * 3)
 """Of a placement that comes without one, where it has to be compared with a prediction."""
 
@@ -38,7 +39,7 @@ class Step:
     ----------
     T_reference_sensor : (4, 4) float64
     covariance : (6, 6) float64 or None
-    systematic : (6, 6) float64 or None
+    correlated_error : (6, 6) float64 or None
         As of `Registration`.
     fused : Motion or None
         Where directions were predicted: pose and velocity with all that is known of them.
@@ -48,7 +49,7 @@ class Step:
 
     T_reference_sensor: Array
     covariance: Array | None
-    systematic: Array | None = None
+    correlated_error: Array | None = None
     fused: Motion | None = None
     note: str = ''
 
@@ -73,15 +74,13 @@ def choose(found: Registration, motion: Motion, stamp_ns: int, config: TrackerCo
     refine : callable
         Refines a placement on the clouds: `Registration` has done so with its best one only.
     """
-    if found.T_target_source is None:
+    if found.T_target_source is None or found.status is Status.REFUSED:
         return found.reason
-    if found.success:
-        step = Step(found.T_target_source, found.covariance, found.systematic)
+    if found.status is Status.REGISTERED:
+        step = Step(found.T_target_source, found.covariance, found.correlated_error)
         return motion.impossible(stamp_ns, step.T_reference_sensor, config) or step
-    if not len(found.degenerate) and not found.alternatives:
-        return found.reason
     prediction = motion.predict(stamp_ns, config)
-    best = Placement(found.T_target_source, found.covariance, _free(found), found.evidence)
+    best = Placement(found.T_target_source, found.covariance, _free(found))
     near = [refine(other) for other in found.alternatives
             if prediction.distance(other.T_target_source,
                                    _information(other, ROUGH_COVARIANCE)) < GATE]
@@ -98,7 +97,7 @@ def is_likely(found: Registration, prediction: Motion) -> bool:
     """Whether a registration that stands for itself lies where it was predicted."""
     assert found.T_target_source is not None
     return prediction.distance(found.T_target_source, _information(Placement(
-        found.T_target_source, found.covariance, found.degenerate, found.evidence))) < GATE
+        found.T_target_source, found.covariance, found.degenerate))) < GATE
 
 
 def _free(found: Registration) -> Array:

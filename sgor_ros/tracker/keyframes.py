@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.config import SgorConfig
-from ..core.scan.preprocessing import preprocess
-from ..core.scan.scan import PreparedScan
+from ..core.prepared_scan import PreparedScan
+from ..core.preprocessing import preprocess
 from .covariance import PoseCovariance
 
 NEWEST = 3

@@ -5,7 +5,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.result import Registration
+from ..core.verdict.result import Registration
 
 
 class State(StrEnum):
@@ -71,7 +71,7 @@ class TrackedScan:
         Scans dropped so far because of their stamps.
     confirmed : bool
         Whether the clouds confirmed the motion that was predicted, so that SGOR did not run:
-        `registration` comes from `confirm`.
+        `registration` comes from `check_prediction`.
     """
 
     stamp_ns: int

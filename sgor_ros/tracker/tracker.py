@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 from ..core.common import se3
 from ..core.common.settings import InputError
 from ..core.config import SgorConfig
-from ..core.confirmation import confirm
+from ..core.prediction_check import check_prediction
+from ..core.prepared_scan import PreparedScan
+from ..core.preprocessing import preprocess
 from ..core.registration import register
-from ..core.result import Registration
-from ..core.scan.preprocessing import preprocess
-from ..core.scan.scan import PreparedScan
 from ..core.scan.scan import SemanticScan
+from ..core.verdict.result import Registration
 from .choice import choose
 from .choice import is_likely
 from .choice import refined
@@ -175,17 +175,19 @@ class Tracker:
         assert self._reference is not None
         prediction = motion.predict(new.stamp_ns, c)
         T = prediction.T_reference_sensor
-        if not (c.predict_first and self._sure and not self._failures and prediction.is_narrow()
-                and self._stays(T)):
+        if not (c.predict_first and self.config.rival_radius > 0 and self._sure
+                and not self._failures and prediction.is_narrow() and self._stays(T)):
             return None
         self._reference = self._reference.ready(self.config)
-        found = confirm(new.prepared, self._reference.prepared, T, self.config)
+        if new.prepared.scale != self._reference.prepared.scale:
+            return None
+        found = check_prediction(new.prepared, self._reference.prepared, T, self.config)
         new.spent(found.timings)
         if (not found.success or found.T_target_source is None
                 or not self._stays(found.T_target_source, found)
                 or not is_likely(found, prediction)):
             return None
-        step = Step(found.T_target_source, found.covariance, found.systematic)
+        step = Step(found.T_target_source, found.covariance, found.correlated_error)
         if motion.impossible(new.stamp_ns, step.T_reference_sensor, c):
             return None
         new.registration, new.reference, new.confirmed = found, self._reference, True
@@ -215,7 +217,7 @@ class Tracker:
         """Return a step to a keyframe that is not the reference, if the sensor can be there."""
         assert self._reference is not None
         assert found.T_target_source is not None
-        step = Step(found.T_target_source, found.covariance, found.systematic)
+        step = Step(found.T_target_source, found.covariance, found.correlated_error)
         if keyframe.track_id != self._track_id:
             return step
         T = (se3.inverse(self._reference.T_odom_sensor) @ keyframe.T_odom_sensor
@@ -253,7 +255,7 @@ class Tracker:
         covariance = None
         if keyframe.covariance is not None and step.covariance is not None:
             covariance = keyframe.covariance.then(keyframe.T_odom_sensor, T, step.covariance,
-                                                  step.systematic)
+                                                  step.correlated_error)
         result = replace(
             self._result(new, State.TRACKING if step.fused is None else State.DEGENERATE),
             success=True, T_odom_sensor=T_odom_sensor,
@@ -341,7 +343,7 @@ class Tracker:
 
 
 def _overlap(found: Registration) -> float:
-    return found.evidence.get('agree', 0.0)
+    return 0.0 if found.score is None else found.score.overlap
 
 
 def _is_far(T: Array, config: TrackerConfig) -> bool:

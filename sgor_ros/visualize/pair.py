@@ -8,9 +8,9 @@ import rerun.blueprint as rrb
 
 from ..core.common import se3
 from ..core.config import SgorConfig
-from ..core.result import Registration
 from ..core.scan.labels import label_convention
 from ..core.scan.scan import SemanticScan
+from ..core.verdict.result import Registration
 from .clouds import few
 from .clouds import median_distance
 from .clouds import shown

@@ -9,8 +9,8 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from ..core.common import se3
-from ..core.result import Registration
 from ..core.scan.ground import Ground
+from ..core.verdict.result import Registration
 
 Array = NDArray[np.float64]
 

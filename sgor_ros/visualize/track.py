@@ -10,9 +10,9 @@ import rerun.blueprint as rrb
 
 from ..core.common import se3
 from ..core.config import SgorConfig
-from ..core.result import Registration
 from ..core.scan.labels import label_convention
 from ..core.scan.scan import SemanticScan
+from ..core.verdict.result import Registration
 from ..tracker import State
 from ..tracker import TrackedScan
 from .clouds import few

@@ -6,12 +6,12 @@ from sgor_ros import preprocess
 from sgor_ros import register
 from sgor_ros import SemanticScan
 from sgor_ros import SgorConfig
+from sgor_ros.core.features import neighbours
+from sgor_ros.core.features.features import Features
+from sgor_ros.core.features.neighbours import radius_neighbours
 from sgor_ros.core.matching import correspondences
 from sgor_ros.core.matching.correspondences import Correspondences
 from sgor_ros.core.matching.correspondences import match
-from sgor_ros.core.scan import neighbours
-from sgor_ros.core.scan.features import Features
-from sgor_ros.core.scan.neighbours import radius_neighbours
 from sgor_ros.core.solver import graph as graph_module
 from sgor_ros.core.solver.graph import consistency_graph
 

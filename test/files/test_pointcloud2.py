@@ -9,6 +9,7 @@ from rosbags.typesys import Stores
 
 from sgor_ros import InputError
 from sgor_ros import Registration
+from sgor_ros import Status
 from sgor_ros import TrackedScan
 from sgor_ros.io import messages
 from sgor_ros.io.label_field import choice_in_words
@@ -178,7 +179,7 @@ def tracked(**changes):
     T_odom_sensor, step = pose(0.3, (4.0, -2.0, 1.0)), pose(0.1, (1.0, 0.5, 0.0))
     moved = points @ step[:3, :3].T + step[:3, 3]
     inliers = np.arange(50) < 10
-    result = Registration(True, '', step, points.astype(float),
+    result = Registration(Status.REGISTERED, '', step, points.astype(float),
                           np.where(inliers[:, None], moved, moved + 9.0), inliers)
     values = {
         'stamp_ns': 1_700_000_000_123_456_789, 'success': True, 'reason': '',

@@ -32,7 +32,7 @@ def elsewhere():
 
 
 @pytest.fixture(scope='module')
-def shared(domain, tmp_path_factory):
+def parallel_for(domain, tmp_path_factory):
     log = tmp_path_factory.mktemp('node') / 'log'
     with NodeProcess(domain, log) as node, ros.Partner(domain) as partner:
         partner.wait_for_node(node.alive)

@@ -15,9 +15,10 @@ from sgor_ros import State
 from sgor_ros import Tracker
 from sgor_ros import TrackerConfig
 from sgor_ros.core.common import se3
-from sgor_ros.core.result import Placement
-from sgor_ros.core.trust.degeneracy import directions
-from sgor_ros.core.trust.degeneracy import Slide
+from sgor_ros.core.degeneracy.directions import DegenerateDirection
+from sgor_ros.core.degeneracy.directions import independent
+from sgor_ros.core.verdict.result import Placement
+from sgor_ros.core.verdict.result import Status
 from sgor_ros.tracker import tracker as tracker_module
 from sgor_ros.tracker.choice import _information
 from sgor_ros.tracker.choice import choose as choose_refined
@@ -39,10 +40,12 @@ def pose(x, y=0.0, z=0.0, yaw=0.0):
 def registration(T, *others, success=False, degenerate=None, covariance=COVARIANCE):
     """Return what is known of a pair whose placements are T and others."""
     free = np.empty((0, 6)) if degenerate is None else degenerate
+    status = (Status.REGISTERED if success else Status.AMBIGUOUS if others
+              else Status.DEGENERATE if len(free) else Status.REFUSED)
     return Registration(
-        success, '' if success else 'not alone', T, np.zeros((20, 3)), np.zeros((20, 3)),
+        status, '' if success else 'not alone', T, np.zeros((20, 3)), np.zeros((20, 3)),
         np.ones(20, np.bool_), 1.0, covariance, degenerate=free,
-        alternatives=tuple(Placement(other, covariance, free, {}) for other in others))
+        alternatives=tuple(Placement(other, covariance, free) for other in others))
 
 
 def choose(*given):
@@ -269,7 +272,7 @@ def test_whatever_the_free_directions_are_the_information_is_one(driving):
         root = rng.normal(size=(6, 6)) * np.repeat((0.05, 0.003), 3)[:, None]
         covariance = root @ root.T + np.diag([1e-8] * 3 + [1e-10] * 3)
         free = twists / np.linalg.norm(twists, axis=1, keepdims=True)
-        information = _information(Placement(np.eye(4), covariance, free, {}))
+        information = _information(Placement(np.eye(4), covariance, free))
         values = np.linalg.eigvalsh(information)
         assert values[0] > -1e-9 * values[-1]
         along = np.einsum('ki,ij,kj->k', free, information, free)
@@ -285,15 +288,15 @@ def test_directions_that_leave_degeneracy_are_independent():
     rng = np.random.default_rng(1)
     for _ in range(2000):
         lever = 10.0**rng.uniform(0, 2)
-        slides = tuple(Slide(twist, 1.0, lever) for twist in twists_of_any_kind(rng))
-        found = directions(slides)
+        slides = tuple(DegenerateDirection(twist, 1.0, lever) for twist in twists_of_any_kind(rng))
+        found = independent(slides)
         assert 1 <= len(found) <= 6
         np.testing.assert_allclose(np.linalg.norm(found, axis=1), 1)
         metric = found * np.repeat((1.0, lever), 3)
         metric /= np.linalg.norm(metric, axis=1, keepdims=True)
         assert np.linalg.svd(metric)[1][-1] > 1e-4
     three = [np.array([np.cos(a), np.sin(a), 0, 0, 0, 0]) for a in (0.0, 1.0, 2.0)]
-    found = directions(tuple(Slide(twist, 1.0, 10.0) for twist in three))
+    found = independent(tuple(DegenerateDirection(twist, 1.0, 10.0) for twist in three))
     np.testing.assert_allclose(found, three[:2])
 
 

@@ -1,1 +1,1 @@
-"""What every room uses: settings, checks at the door, transformations, threads."""
+"""What every room uses: settings, checks at the door, transformations."""

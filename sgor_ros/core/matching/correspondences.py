@@ -9,15 +9,15 @@ from numpy.typing import NDArray
 from ..common.checks import as_labels
 from ..common.checks import finite_points
 from ..common.settings import InputError
-from ..common.threads import shared
 from ..config import SgorConfig
-from ..scan.context import OCTAVES
-from ..scan.descriptors import regional_labels
-from ..scan.features import Features
+from ..execution.threads import parallel_for
+from ..features.descriptors import regional_labels
+from ..features.features import Features
+from ..features.neighbours import radius_neighbours
+from ..features.semantic_context import OCTAVES
 from ..scan.labels import label_convention
 from ..scan.labels import LabelConvention
 from ..scan.labels import UNLABELLED
-from ..scan.neighbours import radius_neighbours
 from ..scan.voxels import one_point_voxels
 from ..scan.voxels import thin
 
@@ -126,8 +126,8 @@ def match(source: Features, target: Features, config: SgorConfig) -> Corresponde
             asked = thin(len(rows), _affordable(first, last))
             rows, first, last = rows[asked], first[asked], last[asked]
             found = np.empty(len(rows), np.int64)
-            shared(_nearest_in_runs, len(rows), described[rows], candidates[order], first, last,
-                   found)
+            parallel_for(_nearest_in_runs, len(rows), described[rows], candidates[order], first,
+                         last, found)
             nearest[rows[found >= 0]] = order[found[found >= 0]]
     found = np.flatnonzero(nearest >= 0)
     s, t = source[found], target[nearest[found]]

@@ -1,1 +1,1 @@
-"""Everything of one scan that does not depend on another (paper, Sec. III-B)."""
+"""One scan: its points, labels, voxels, ground and size (paper, Sec. III-B)."""

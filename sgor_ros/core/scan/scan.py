@@ -8,16 +8,7 @@ from numpy.typing import NDArray
 from ..common.checks import as_labels
 from ..common.checks import as_points
 from ..common.checks import finite_rows
-from ..common.later import Later
 from ..common.settings import InputError
-from ..config import SgorConfig
-from ..trust.view import View
-from .features import Features
-from .ground import Ground
-from .surface import Surface
-
-Given = tuple[ArrayLike | None, ArrayLike | None]
-"""Keypoints and descriptors of the caller, before they are checked."""
 
 
 @dataclass(frozen=True, eq=False, init=False, repr=False)
@@ -58,70 +49,3 @@ class SemanticScan:
     def __repr__(self) -> str:
         labels = '' if self.labels is None else f', {len(np.unique(self.labels))} label ids'
         return f'SemanticScan({len(self)} points{labels})'
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class PreparedScan:
-    """Everything of one scan that does not depend on the other: the result of `preprocess`.
-
-    Attributes
-    ----------
-    scan : SemanticScan
-        What it was made from.
-    config : SgorConfig
-        What it was made with, but for the scale.
-    scale : float
-        What the lengths of the configuration were multiplied by.
-    features : Features
-        Keypoints with labels, descriptors and heights.
-    ground : Ground or None
-        None where no ground plane was found.
-    view : View
-        What it can say about transformations.
-    surfaced : Later of Surface or None
-        Makes `surface`.
-    warnings : tuple of str
-        What was odd about the scan, in words.
-    timings : dict of str to float
-        Stage to seconds.
-    given : pair of arrays or None
-        Keypoints and descriptors of the caller.
-    """
-
-    scan: SemanticScan
-    config: SgorConfig
-    scale: float
-    features: Features
-    ground: Ground | None
-    view: View
-    surfaced: Later[Surface | None]
-    warnings: tuple[str, ...]
-    timings: dict[str, float]
-    given: Given | None = None
-
-    @property
-    def surface(self) -> Surface | None:
-        """Cloud for the local refinement; None where that is off or there are too few points."""
-        return self.surfaced()
-
-    def __repr__(self) -> str:
-        return (f'PreparedScan({self.scan}, {len(self.features.points)} keypoints, '
-                f'scale {self.scale:g})')
-
-
-def as_scan(scan: SemanticScan | PreparedScan | ArrayLike,
-            name: str) -> SemanticScan | PreparedScan:
-    """Return a scan as it is, and (N, 3) points as one without labels.
-
-    Raises
-    ------
-    InputError
-        Naming `name`, what is neither.
-    """
-    if isinstance(scan, SemanticScan | PreparedScan):
-        return scan
-    try:
-        return SemanticScan(scan)
-    except InputError as error:
-        raise InputError(f'{name}: neither a SemanticScan nor an (N, 3) array of points '
-                         f'({error})') from error

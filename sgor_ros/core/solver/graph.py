@@ -14,9 +14,9 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from ..common.lanes import count
-from ..common.threads import shared
 from ..config import SgorConfig
+from ..execution.simd import count
+from ..execution.threads import parallel_for
 from ..matching.correspondences import Correspondences
 from ..scan.voxels import thin
 from .lengths import lanes_of
@@ -120,7 +120,7 @@ def pairs_within(correspondences: Correspondences, sigma_d: float, reach: float)
         for band, own in zip(bands[first:last], place[first:last], strict=True):
             _fill(band.first, band.length, band.index, band.weight, middle, own, index, weight)
 
-    shared(fill, len(bands))
+    parallel_for(fill, len(bands))
     return Rows(start, index, weight)
 
 
@@ -168,7 +168,7 @@ def _upper(p: NDArray[np.float64], q: NDArray[np.float64], nodes: int, sigma_d: 
             found = _keep(rows[b], both, bits, sigma_d, reach, length, below[b], index, weight)
             bands[b] = _Band(rows[b], length, index[:found], weight[:found])
 
-    shared(find, count)
+    parallel_for(find, count)
     return bands, below
 
 

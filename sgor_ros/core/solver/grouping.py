@@ -5,8 +5,8 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from ..common.threads import shared
 from ..config import SgorConfig
+from ..execution.threads import parallel_for
 from ..matching.correspondences import Correspondences
 from .graph import ConsistencyGraph
 from .lengths import U64
@@ -48,8 +48,8 @@ def group(correspondences: Correspondences, graph: ConsistencyGraph,
     reach = np.empty(len(keys))
     # no two are farther apart
     most = 1e-9 + 1.001 * float((np.ptp(correspondences.source, axis=0)**2).sum())
-    shared(_squared_reach, len(keys), np.ascontiguousarray(correspondences.source.T), keys, k,
-           most, reach)
+    parallel_for(_squared_reach, len(keys), np.ascontiguousarray(correspondences.source.T), keys,
+                 k, most, reach)
     return Groups(keys, reach)
 
 
@@ -64,7 +64,8 @@ def leading_eigenvector(graph: ConsistencyGraph) -> NDArray[np.float32]:
     vector = np.ones(len(graph.start) - 1, np.float32)
     product = np.empty_like(vector)
     for _ in range(POWER_ITERATIONS):
-        shared(_multiply, len(vector), graph.start, graph.index, graph.weight, vector, product)
+        parallel_for(_multiply, len(vector), graph.start, graph.index, graph.weight, vector,
+                     product)
         vector, product = product / np.linalg.norm(product), vector
     return vector
 

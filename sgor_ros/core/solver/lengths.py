@@ -5,10 +5,10 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from ..common.lanes import at_most
-from ..common.lanes import load
-from ..common.lanes import lowest
-from ..common.lanes import splat
+from ..execution.simd import at_most
+from ..execution.simd import load
+from ..execution.simd import lowest
+from ..execution.simd import splat
 
 PREFILTER_SLACK = 1e-3
 """Metres: float32 finds the candidate pairs, float64 decides. In a scan of 100 m the former errs

@@ -11,12 +11,12 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from ..common.lanes import add_where
-from ..common.lanes import load
-from ..common.lanes import splat
-from ..common.lanes import store
-from ..common.lanes import total
-from ..common.threads import shared
+from ..execution.simd import add_where
+from ..execution.simd import load
+from ..execution.simd import splat
+from ..execution.simd import store
+from ..execution.simd import total
+from ..execution.threads import parallel_for
 from ..matching.correspondences import Correspondences
 from .graph import ConsistencyGraph
 from .graph import pairs_within
@@ -90,23 +90,24 @@ def add_support(correspondences: Correspondences, graph: ConsistencyGraph, far: 
         p, q = correspondences.source, correspondences.target
         both = np.hstack((p - p.mean(axis=0), q - q.mean(axis=0)))
         some = np.flatnonzero(near)
-        shared(_support_afar, tasks, graph.start, graph.index, both, both[some],
-               lanes_of(both[some, :3], both[some, 3:]), prefilter_limit(graph.reach),
-               graph.sigma_d, graph.reach, near[some], block.wanted, support)
+        parallel_for(_support_afar, tasks, graph.start, graph.index, both, both[some],
+                     lanes_of(both[some, :3], both[some, 3:]), prefilter_limit(graph.reach),
+                     graph.sigma_d, graph.reach, near[some], block.wanted, support)
     elif block.visits < SPARSE * len(graph.index):
-        shared(_scatter, len(keys), graph.start, graph.index, far.start, far.index,
-               far.weight, keys, support)
+        parallel_for(_scatter, len(keys), graph.start, graph.index, far.start, far.index,
+                     far.weight, keys, support)
     else:
-        shared(_support, tasks, far.start, far.index, far.weight, near.view(np.uint16), support)
+        parallel_for(_support, tasks, far.start, far.index, far.weight, near.view(np.uint16),
+                     support)
 
 
 def choose(graph: ConsistencyGraph, block: Block, support: NDArray[np.float32],
            places: NDArray[np.intp], kept: NDArray[np.int64], scores: NDArray[np.float32]) -> None:
     """Sum the support of each key over the ones of what it may keep; leave the best in its row."""
     bits = np.zeros((len(block.rows) + 1, support.shape[1] // 64), np.uint64)
-    shared(_mark_rows, len(block.rows), graph.start, graph.index, block.rows, bits)
-    shared(_choose, len(places), support, block.rows, block.wanted[block.rows],
-           bits.view(np.uint16), places, kept, scores)
+    parallel_for(_mark_rows, len(block.rows), graph.start, graph.index, block.rows, bits)
+    parallel_for(_choose, len(places), support, block.rows, block.wanted[block.rows],
+                 bits.view(np.uint16), places, kept, scores)
 
 
 @numba.njit(cache=True, nogil=True)

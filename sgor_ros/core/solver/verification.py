@@ -5,11 +5,11 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from ..common.threads import shared
 from ..config import SgorConfig
+from ..execution.threads import parallel_for
+from ..index.scan_index import ScanIndex
 from ..matching.correspondences import Correspondences
-from ..trust.evidence import rank
-from ..trust.view import View
+from ..scoring.pose_scoring import rough_scores
 from .hypotheses import Hypotheses
 
 Normals = tuple[NDArray[np.float64], NDArray[np.float64]]
@@ -17,7 +17,7 @@ Normals = tuple[NDArray[np.float64], NDArray[np.float64]]
 
 
 @dataclass(frozen=True, eq=False)
-class Verdict:
+class Verification:
     """Which hypotheses passed.
 
     Attributes
@@ -38,18 +38,20 @@ class Verdict:
 
     @property
     def reason(self) -> str:
-        """Why there is no winner, in words."""
+        """Why there is no winner, in words; empty where there is one."""
+        if self.best >= 0:
+            return ''
         if not len(self.cost):
             return 'no group of correspondences is consistent'
         return f'none of {len(self.cost)} hypotheses keeps the ground level'
 
 
 def verify(hypotheses: Hypotheses, correspondences: Correspondences,
-           ground_normals: Normals | None, views: tuple[View, View] | None,
-           config: SgorConfig) -> Verdict:
+           ground_normals: Normals | None, indexes: tuple[ScanIndex, ScanIndex] | None,
+           config: SgorConfig) -> Verification:
     """Drop hypotheses that tilt the ground, then take the nearest fit of the filtered matches.
 
-    With the views of source and target and `cloud_check`, the clouds choose instead of the fit.
+    With the indexes of source and target and `cloud_check`, the clouds choose instead of the fit.
     """
     T = hypotheses.T_target_source
     passed = np.ones(len(T), np.bool_)
@@ -57,14 +59,14 @@ def verify(hypotheses: Hypotheses, correspondences: Correspondences,
         passed = ground_angles(T, *ground_normals) < config.sigma_theta
     cost = np.full(len(T), np.inf)
     if not passed.any():
-        return Verdict(passed, cost, -cost, -1)
+        return Verification(passed, cost, -cost, -1)
     cost[passed] = truncated_distance(
         T[passed], correspondences.source[hypotheses.union],
         correspondences.target[hypotheses.union], config.sigma_d)
     score = -cost
-    if config.cloud_check and views is not None:
-        score[passed] = rank(*views, T[passed])
-    return Verdict(passed, cost, score, int(np.argmax(score)))
+    if config.cloud_check and indexes is not None:
+        score[passed] = rough_scores(*indexes, T[passed])
+    return Verification(passed, cost, score, int(np.argmax(score)))
 
 
 def ground_angles(T: NDArray[np.float64], source_normal: NDArray[np.float64],
@@ -82,8 +84,8 @@ def truncated_distance(T: NDArray[np.float64], source: NDArray[np.float64],
                        target: NDArray[np.float64], sigma_d: float) -> NDArray[np.float64]:
     """Return the mean of TD over (N, 3) matches for each of (H, 4, 4) (Eq. 18 and 19), metres."""
     cost = np.empty(len(T))
-    shared(_truncated_distance, len(T), T, np.ascontiguousarray(source.T),
-           np.ascontiguousarray(target.T), sigma_d, cost)
+    parallel_for(_truncated_distance, len(T), T, np.ascontiguousarray(source.T),
+                 np.ascontiguousarray(target.T), sigma_d, cost)
     return cost
 
 
@@ -91,8 +93,8 @@ def near_counts(T: NDArray[np.float64], source: NDArray[np.float64], target: NDA
                 reach: float) -> NDArray[np.int64]:
     """Return how many of (N, 3) matches lie within `reach` metres for each of (H, 4, 4)."""
     counts = np.zeros(len(T), np.int64)
-    shared(_near_counts, len(T), T, np.ascontiguousarray(source.T),
-           np.ascontiguousarray(target.T), reach, counts)
+    parallel_for(_near_counts, len(T), T, np.ascontiguousarray(source.T),
+                 np.ascontiguousarray(target.T), reach, counts)
     return counts
 
 

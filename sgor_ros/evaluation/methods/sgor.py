@@ -1,10 +1,10 @@
 """SGOR itself, in any configuration."""
 from functools import partial
 
-from ...core.common.stopwatch import Stopwatch
-from ...core.common.threads import cores
 from ...core.config import SgorConfig
-from ...core.registration import solve
+from ...core.execution.stopwatch import Stopwatch
+from ...core.execution.threads import cores
+from ...core.solver.solution import solve
 from .problem import Matches
 from .problem import Method
 from .problem import Solution

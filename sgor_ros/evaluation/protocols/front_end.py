@@ -11,10 +11,10 @@ from ...core.config import SgorConfig
 from ...core.matching.correspondences import Correspondences
 from ...core.matching.correspondences import match
 from ...core.matching.correspondences import overlap_region
+from ...core.prepared_scan import PreparedScan
+from ...core.preprocessing import preprocess
 from ...core.scan.labels import label_convention
 from ...core.scan.labels import UNLABELLED
-from ...core.scan.preprocessing import preprocess
-from ...core.scan.scan import PreparedScan
 from ...core.scan.scan import SemanticScan
 from ...io.datasets import Frame
 from ..methods import Matches

@@ -192,7 +192,7 @@ def test_dropped_ids_leave_no_keypoints():
                           SgorConfig(label_convention='nuscenes'))
     assert prepared.features.points[:, 0].min() > 8.5
     # nothing was measured nearer than the trees
-    assert prepared.view.nearest.min() > 8.5
+    assert prepared.index.ranges.min() > 8.5
 
 
 def test_a_table_of_the_user(tmp_path):

@@ -11,7 +11,7 @@ from sgor_ros import preprocess
 from sgor_ros import register
 from sgor_ros import SemanticScan
 from sgor_ros import SgorConfig
-from sgor_ros.core.scan.preprocessing import at_scale
+from sgor_ros.core.preprocessing import at_scale
 from sgor_ros.core.scan.scale import scale_of
 from sgor_ros.core.scan.scale import SMALLEST
 from sgor_ros.io.datasets import open_drives

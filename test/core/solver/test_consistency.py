@@ -129,7 +129,7 @@ def test_threads_change_nothing():
         one, two = (register_correspondences(matches.source, matches.target,
                                              config=config.replace(threads=threads))
                     for threads in (1, 2))
-        assert np.array_equal(one.hypotheses, two.hypotheses)
+        assert np.array_equal(one.solution.hypotheses, two.solution.hypotheses)
         assert np.array_equal(one.T_target_source, two.T_target_source)
 
 

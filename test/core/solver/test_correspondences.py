@@ -7,11 +7,11 @@ import pytest
 from sgor_ros import InputError
 from sgor_ros import register_correspondences
 from sgor_ros import SgorConfig
+from sgor_ros.core.features.features import Features
 from sgor_ros.core.matching.correspondences import given_correspondences
 from sgor_ros.core.matching.correspondences import match
 from sgor_ros.core.matching.correspondences import overlap_region
 from sgor_ros.core.matching.correspondences import thin
-from sgor_ros.core.scan.features import Features
 
 PLAIN = SgorConfig(match_within_labels=False, height_gate=0.0, context_weight=0.0)
 

@@ -11,10 +11,10 @@ from sgor_ros import register
 from sgor_ros import register_correspondences
 from sgor_ros import SemanticScan
 from sgor_ros import SgorConfig
-from sgor_ros.core.scan.descriptors import fpfh
-from sgor_ros.core.scan.descriptors import normals
+from sgor_ros.core.features.descriptors import fpfh
+from sgor_ros.core.features.descriptors import normals
+from sgor_ros.core.features.neighbours import radius_neighbours
 from sgor_ros.core.scan.labels import label_convention
-from sgor_ros.core.scan.neighbours import radius_neighbours
 
 PAPER = SgorConfig.paper()
 CONVENTION = label_convention(PAPER.label_convention)
@@ -107,7 +107,7 @@ def test_labelled_matches_equal_the_dense_reference(data_folder, name):
     expected = dense.solve(source, target, *solver_settings(config), labels=classes[labels],
                            regional=regional, normals=ground_normals,
                            sigma_theta=config.sigma_theta)
-    assert 0 < result.passed_ground_check.sum() < len(result.passed_ground_check)
+    assert 0 < result.solution.passed_ground_check.sum() < len(result.solution.passed_ground_check)
     np.testing.assert_allclose(result.T_target_source, expected, atol=1e-5)
 
 

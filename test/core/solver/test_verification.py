@@ -132,13 +132,13 @@ def test_ground_check_of_given_matches():
     good = register_correspondences(source, target, ground_normals=(UP, UP))
     np.testing.assert_allclose(good.T_target_source, T, atol=1e-6)
     assert good.success
-    assert good.passed_ground_check.all()
+    assert good.solution.passed_ground_check.all()
     bad = register_correspondences(source, target, ground_normals=(UP, -UP))
     assert not bad.success
     assert bad.T_target_source is None
     assert 'keeps the ground level' in bad.reason
-    assert len(bad.hypotheses) == len(bad.passed_ground_check) > 0
-    assert not bad.passed_ground_check.any()
+    assert len(bad.solution.hypotheses) == len(bad.solution.passed_ground_check) > 0
+    assert not bad.solution.passed_ground_check.any()
     off = register_correspondences(source, target, ground_normals=(UP, -UP),
                                    config=SgorConfig(ground_check=False))
     assert off.success

@@ -1,0 +1,1 @@
+"""How compiled code runs: threads, lazy values, compiling, SIMD, stopwatch."""

@@ -1,0 +1,19 @@
+"""What is made when it is first asked for."""
+from collections.abc import Callable
+from threading import Lock
+
+
+class Lazy[Thing]:
+    """Something that takes time to make, and is not always needed."""
+
+    def __init__(self, make: Callable[[], Thing]) -> None:
+        self._make: Callable[[], Thing] | None = make
+        self._lock = Lock()
+
+    def __call__(self) -> Thing:
+        """Return it; the first call makes it."""
+        with self._lock:
+            if self._make is not None:
+                self._thing = self._make()
+                self._make = None    # and let go of what it was made from
+            return self._thing

@@ -1,0 +1,1 @@
+"""Competing hypotheses: other poses that may explain two scans as well (perceptual aliasing)."""

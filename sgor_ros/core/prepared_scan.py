@@ -1,0 +1,83 @@
+"""What `preprocess` makes of one scan (`PreparedScan`)."""
+from dataclasses import dataclass
+
+from numpy.typing import ArrayLike
+
+from .common.settings import InputError
+from .config import SgorConfig
+from .execution.lazy import Lazy
+from .features.features import Features
+from .index.scan_index import ScanIndex
+from .index.surface import Surface
+from .scan.ground import Ground
+from .scan.scan import SemanticScan
+
+Given = tuple[ArrayLike | None, ArrayLike | None]
+"""Keypoints and descriptors of the caller, before they are checked."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PreparedScan:
+    """Everything of one scan that does not depend on the other: the result of `preprocess`.
+
+    Attributes
+    ----------
+    scan : SemanticScan
+        What it was made from.
+    config : SgorConfig
+        What it was made with, but for the scale.
+    scale : float
+        What the lengths of the configuration were multiplied by.
+    features : Features
+        Keypoints with labels, descriptors and heights.
+    ground : Ground or None
+        None where no ground plane was found.
+    index : ScanIndex
+        What it can say about transformations.
+    surfaced : Lazy of Surface or None
+        Makes `surface`.
+    warnings : tuple of str
+        What was odd about the scan, in words.
+    timings : dict of str to float
+        Stage to seconds.
+    given : pair of arrays or None
+        Keypoints and descriptors of the caller.
+    """
+
+    scan: SemanticScan
+    config: SgorConfig
+    scale: float
+    features: Features
+    ground: Ground | None
+    index: ScanIndex
+    surfaced: Lazy[Surface | None]
+    warnings: tuple[str, ...]
+    timings: dict[str, float]
+    given: Given | None = None
+
+    @property
+    def surface(self) -> Surface | None:
+        """Cloud for the local refinement; None where that is off or there are too few points."""
+        return self.surfaced()
+
+    def __repr__(self) -> str:
+        return (f'PreparedScan({self.scan}, {len(self.features.points)} keypoints, '
+                f'scale {self.scale:g})')
+
+
+def as_scan(scan: SemanticScan | PreparedScan | ArrayLike,
+            name: str) -> SemanticScan | PreparedScan:
+    """Return a scan as it is, and (N, 3) points as one without labels.
+
+    Raises
+    ------
+    InputError
+        Naming `name`, what is neither.
+    """
+    if isinstance(scan, SemanticScan | PreparedScan):
+        return scan
+    try:
+        return SemanticScan(scan)
+    except InputError as error:
+        raise InputError(f'{name}: neither a SemanticScan nor an (N, 3) array of points '
+                         f'({error})') from error

@@ -1,0 +1,1 @@
+"""Pose scoring: overlap and free-space violations of one pose, and two poses compared by them."""
