@@ -67,11 +67,12 @@ def main() -> None:
 
 def make_tasks(arguments) -> list[str]:
     """Write matches and scans into the folder; return the names of what is to be timed."""
+    from sgor_ros.evaluation.solver import fpfh_matches
+    from sgor_ros.evaluation.solver import made_up
+
     from sgor_ros.commands.benchmarks.inputs import WORLD_SCANS
     from sgor_ros.commands.benchmarks.inputs import WORLD_SPEED
     from sgor_ros.evaluation import pairs as pairing
-    from sgor_ros.evaluation.solver import fpfh_matches
-    from sgor_ros.evaluation.solver import made_up
     from sgor_ros.io.datasets import open_drives
     FOLDER.mkdir(parents=True, exist_ok=True)
     if arguments.data:

@@ -9,6 +9,7 @@ import sys
 from typing import Protocol
 
 from ..core.warmup import warm_up
+from ..evaluation.extra import require_evaluation
 from ..io.writing import free_folder
 from ..io.writing import new_folder
 from .benchmarks import ablation
@@ -48,6 +49,7 @@ def main(argv: list[str] | None = None) -> int:
 
 def measure(arguments: Namespace) -> int:
     """Run one of the benchmarks on some cores, into a folder of its own."""
+    require_evaluation()
     output = arguments.output or free_folder(Path('out/benchmark') / arguments.command)
     with _cores(arguments.cores), new_folder(output) as place:
         warm_up(default_config(arguments))

@@ -5,21 +5,21 @@ import json
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
-
-from sgor_ros.commands.benchmark import main
-from sgor_ros.core.config import SgorConfig
-from sgor_ros.evaluation import pairs as pairing
-from sgor_ros.evaluation import report
-from sgor_ros.evaluation import solver
 from sgor_ros.evaluation.ablation import PAPER_ROWS
-from sgor_ros.evaluation.metrics import THREE_SIGMA
-from sgor_ros.evaluation.pairs import Pair
 from sgor_ros.evaluation.rivals import Answer
 from sgor_ros.evaluation.run import Method
 from sgor_ros.evaluation.run import Row
 from sgor_ros.evaluation.run import run_pairs
 from sgor_ros.evaluation.run import sample_of
 from sgor_ros.evaluation.run import sgor
+
+from sgor_ros.commands.benchmark import main
+from sgor_ros.core.config import SgorConfig
+from sgor_ros.evaluation import pairs as pairing
+from sgor_ros.evaluation import report
+from sgor_ros.evaluation import solver
+from sgor_ros.evaluation.metrics import THREE_SIGMA
+from sgor_ros.evaluation.pairs import Pair
 from sgor_ros.io.datasets import Drive
 from sgor_ros.io.datasets import open_drives
 from sgor_ros.io.trajectories import write_kitti

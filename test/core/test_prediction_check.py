@@ -4,13 +4,13 @@ from conftest import relative
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from sgor_ros.commands.scene_pairs import scene_drive
 
 from sgor_ros import InputError
 from sgor_ros import preprocess
 from sgor_ros import register
 from sgor_ros import SemanticScan
 from sgor_ros import SgorConfig
-from sgor_ros.commands.scene_pairs import scene_drive
 from sgor_ros.core.common import se3
 from sgor_ros.core.prediction_check import check_prediction
 

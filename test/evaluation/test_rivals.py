@@ -3,14 +3,14 @@ import sys
 
 import numpy as np
 import pytest
-
-from sgor_ros.evaluation import pairs as pairing
-from sgor_ros.evaluation.metrics import rotation_error_deg
-from sgor_ros.evaluation.metrics import translation_error_m
 from sgor_ros.evaluation.rivals import kiss_icp
 from sgor_ros.evaluation.rivals import scan_to_scan
 from sgor_ros.evaluation.run import rivals
 from sgor_ros.evaluation.run import sample_of
+
+from sgor_ros.evaluation import pairs as pairing
+from sgor_ros.evaluation.metrics import rotation_error_deg
+from sgor_ros.evaluation.metrics import translation_error_m
 
 NAMES = {'kiss-matcher-0.3': 'kiss_matcher', 'kiss-matcher-0.5': 'kiss_matcher',
          'ransac': 'open3d', 'fgr': 'open3d'}

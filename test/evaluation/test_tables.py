@@ -11,6 +11,15 @@ import time
 import numpy as np
 from PIL import Image
 import pytest
+from sgor_ros.evaluation.protocols.drives import posed
+from sgor_ros.evaluation.protocols.drives import strided
+from sgor_ros.evaluation.protocols.run import Entry
+from sgor_ros.evaluation.protocols.run import run
+from sgor_ros.evaluation.protocols.tables import latex
+from sgor_ros.evaluation.protocols.tables import main_rows
+from sgor_ros.evaluation.protocols.tables import whole
+from sgor_ros.evaluation.protocols.task import EASY
+from sgor_ros.evaluation.protocols.truth import refined
 
 from sgor_ros import InputError
 from sgor_ros.core.common import se3
@@ -21,8 +30,6 @@ from sgor_ros.evaluation.pairs import drive_of
 from sgor_ros.evaluation.protocols import front_end
 from sgor_ros.evaluation.protocols import record
 from sgor_ros.evaluation.protocols import studies
-from sgor_ros.evaluation.protocols.drives import posed
-from sgor_ros.evaluation.protocols.drives import strided
 from sgor_ros.evaluation.protocols.given import given_matches
 from sgor_ros.evaluation.protocols.indoor import cloud_of_depth
 from sgor_ros.evaluation.protocols.indoor import depth_frames
@@ -32,13 +39,6 @@ from sgor_ros.evaluation.protocols.kitti import kitti_10m_list
 from sgor_ros.evaluation.protocols.kitti import kitti_loops
 from sgor_ros.evaluation.protocols.kitti import read_pair_list
 from sgor_ros.evaluation.protocols.kitti import ten_metre_pairs
-from sgor_ros.evaluation.protocols.run import Entry
-from sgor_ros.evaluation.protocols.run import run
-from sgor_ros.evaluation.protocols.tables import latex
-from sgor_ros.evaluation.protocols.tables import main_rows
-from sgor_ros.evaluation.protocols.tables import whole
-from sgor_ros.evaluation.protocols.task import EASY
-from sgor_ros.evaluation.protocols.truth import refined
 from sgor_ros.world import Lidar
 from sgor_ros.world import simulate
 

@@ -6,9 +6,13 @@ import pytest
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
+from sgor_ros.commands.scene_pairs import scene_pairs
+from sgor_ros.evaluation.rivals import Answer
+from sgor_ros.evaluation.run import Method
+from sgor_ros.evaluation.run import Row
+from sgor_ros.evaluation.run import run_pairs
 
 from sgor_ros.commands.benchmark import main
-from sgor_ros.commands.scene_pairs import scene_pairs
 from sgor_ros.core.common import se3
 from sgor_ros.core.verdict.result import Placement
 from sgor_ros.core.verdict.result import Registration
@@ -17,10 +21,6 @@ from sgor_ros.evaluation import trust
 from sgor_ros.evaluation.metrics import squared_normalised_error
 from sgor_ros.evaluation.metrics import THREE_SIGMA
 from sgor_ros.evaluation.pairs import Pair
-from sgor_ros.evaluation.rivals import Answer
-from sgor_ros.evaluation.run import Method
-from sgor_ros.evaluation.run import Row
-from sgor_ros.evaluation.run import run_pairs
 from sgor_ros.world.scenes import KINDS
 
 NAN = float('nan')

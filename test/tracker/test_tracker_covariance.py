@@ -2,12 +2,12 @@
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from sgor_ros.evaluation.honesty import what_was_said
 
 from sgor_ros import SemanticScan
 from sgor_ros import Tracker
 from sgor_ros import TrackerConfig
 from sgor_ros.core.common import se3
-from sgor_ros.evaluation.honesty import what_was_said
 from sgor_ros.evaluation.metrics import squared_normalised_error
 from sgor_ros.evaluation.metrics import THREE_SIGMA
 from sgor_ros.tracker.covariance import CORRELATION_LENGTHS_M

@@ -1,16 +1,19 @@
 """`sgor_benchmark pairs`: methods on the same pairs."""
 from argparse import ArgumentParser
 from argparse import Namespace
-from dataclasses import asdict
 from pathlib import Path
 
 from ...core.common.settings import InputError
-from ...evaluation import pairs as pairing
-from ...evaluation import plots
-from ...evaluation import report
-from ...evaluation import run as running
-from ...evaluation.run import Method
-from ...evaluation.run import sgor
+from ...evaluation import runner
+from ...evaluation.methods import Method
+from ...evaluation.methods import rivals_on_scans
+from ...evaluation.methods.sgor import on_scans
+from ...evaluation.pairs import selection
+from ...evaluation.pairs.front_end import scans_of
+from ...evaluation.protocols.protocol import Protocol
+from ...evaluation.report import pair_tables
+from ...evaluation.report import plots
+from ...evaluation.rows import records
 from . import inputs
 from .numbers import count
 from .numbers import positive
@@ -38,33 +41,33 @@ def measure(arguments: Namespace, folder: Path) -> None:
     methods = _methods(arguments)
     drives = inputs.drives_of(arguments)
     right = inputs.right_pairs(arguments, drives, arguments.limit)
-    wrong = pairing.wrong_pairs(drives, arguments.wrong, arguments.seed)
-    rows = running.run_pairs(right, methods, arguments.seed)
+    wrong = selection.different_places(drives, arguments.wrong, arguments.seed)
+    rows = runner.run(Protocol.turned(right, arguments.seed), methods, warm_up=True)
     refusing = [method for method in methods if method.refuses]
     if wrong and refusing:
-        rows += running.run_pairs(wrong, refusing, arguments.seed)
-    memory = running.peak_memory_mb(methods, running.sample_of(right[0], arguments.seed)[0])
+        rows += runner.run(Protocol.turned(wrong, arguments.seed), refusing, warm_up=True)
+    memory = runner.peak_memory_mb(methods, scans_of(right[0], arguments.seed)[0])
     names = [method.name for method in methods]
     text = '\n\n'.join((
-        report.pairs_table(rows, names, memory), report.data_sets_table(rows, names), report.RULE
+        pair_tables.pairs_table(rows, names, memory), pair_tables.data_sets_table(rows, names), pair_tables.RULE
         + ' Peak memory: of a process of its own for each method, its libraries included; '
         f'{memory[""]:.0f} MB of it are Python with numpy, scipy, numba and the two scans.'))
-    inputs.finish(arguments, folder, text, [asdict(row) for row in rows], len(right), len(wrong))
+    inputs.finish(arguments, folder, text, records(rows), len(right), len(wrong))
     plots.plot_pairs(folder / 'plot.png', rows, names)
 
 
 def _methods(arguments: Namespace) -> list[Method]:
     config = inputs.default_config(arguments)
-    known = {'sgor': sgor('SGOR', config),
-             'paper': sgor("SGOR, paper's settings", inputs.paper_config(arguments)),
-             **running.rivals(inputs.say)}
+    known = {'sgor': on_scans('SGOR', config),
+             'paper': on_scans("SGOR, paper's settings", inputs.paper_config(arguments)),
+             **rivals_on_scans(inputs.say)}
     for name in arguments.methods or ():
         if name not in known:
             raise InputError(f'--methods {name}: not one of {", ".join(known)}')
     chosen = [known[name] for name in arguments.methods or known]
     if arguments.label_noise:
-        chosen.append(sgor(f'SGOR, {arguments.label_noise:.0%} of labels random', config,
+        chosen.append(on_scans(f'SGOR, {arguments.label_noise:.0%} of labels random', config,
                            arguments.label_noise))
     if arguments.no_labels:
-        chosen.append(sgor('SGOR, no labels', config, labels=False))
+        chosen.append(on_scans('SGOR, no labels', config, labels=False))
     return chosen

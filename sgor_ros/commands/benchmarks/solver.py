@@ -2,21 +2,23 @@
 from argparse import ArgumentParser
 from argparse import Namespace
 from dataclasses import asdict
-import importlib.util
 from pathlib import Path
 
 from ...core.common.settings import InputError
-from ...evaluation import plots
-from ...evaluation import report
-from ...evaluation import run as running
-from ...evaluation import solver
+from ...evaluation import runner
+from ...evaluation.methods import rivals_on_matches
+from ...evaluation.pairs.pair import Pair
+from ...evaluation.protocols import solver
+from ...evaluation.report import plots
+from ...evaluation.report.solver_table import solver_table
+from ...evaluation.report.solver_table import solver_times
 from . import inputs
 from .numbers import count
 from .numbers import positive
 from .numbers import share
 
 HELP = 'time of the solver on made-up matches, and on those of the FPFH of your scans'
-DENSE_REFERENCE = Path(__file__).parents[3] / 'test/dense_reference.py'
+KISS_MATCHER = "KISS-Matcher's solver"
 
 
 def add_options(command: ArgumentParser) -> None:
@@ -36,21 +38,28 @@ def add_options(command: ArgumentParser) -> None:
 
 def measure(arguments: Namespace, folder: Path) -> None:
     """Time the solver on made-up matches, and on those of the FPFH of scans."""
+    config = inputs.default_config(arguments)
     sets = [solver.made_up(count, arguments.inlier_share, arguments.seed)
             for count in arguments.counts]
-    small = [matches for matches in sets if len(matches.source) <= arguments.dense_limit]
-    rows = solver.run_solver([*sets, *_of_scans(arguments)], inputs.default_config(arguments),
-                             arguments.runs, rivals=running.installed('kiss_matcher', inputs.say))
-    dense = _dense_reference()
-    if dense is None:
-        inputs.say('no dense reference here: it is part of the tests, which are not installed')
-    elif small:
-        rows += solver.run_dense(small, dense)
-    inputs.finish(arguments, folder, report.solver_table(rows), [asdict(row) for row in rows])
-    plots.plot_solver(folder / 'plot.png', rows)
+    small = [pair for count, pair in zip(arguments.counts, sets, strict=True)
+             if count <= arguments.dense_limit]
+    sets += _of_scans(arguments)
+    methods = solver.presets(config)
+    rivals = rivals_on_matches(inputs.say)
+    if KISS_MATCHER in rivals:
+        methods.append(rivals[KISS_MATCHER])
+    # the first round only warms up, unless it is the only one
+    repeats = arguments.runs + 1 if arguments.runs > 1 else 1
+    rows = runner.run(solver.solver_protocol(sets), methods, repeats=repeats)
+    times = list(solver_times(rows, sets, arguments.runs, config))
+    if small:
+        rows = runner.run(solver.solver_protocol(small), solver.dense_and_sparse())
+        times += solver_times(rows, small, 1, solver.DENSE_CONFIG)
+    inputs.finish(arguments, folder, solver_table(times), [asdict(each) for each in times])
+    plots.plot_solver(folder / 'plot.png', times)
 
 
-def _of_scans(arguments: Namespace) -> list[solver.Matches]:
+def _of_scans(arguments: Namespace) -> list[Pair]:
     """Return the matches in the folder of the user, and those of pairs of scans."""
     if not arguments.data and not arguments.world:
         return []
@@ -62,16 +71,3 @@ def _of_scans(arguments: Namespace) -> list[solver.Matches]:
             raise
         return given
     return [*solver.fpfh_matches(pairs, arguments.fpfh_matches), *given]
-
-
-def _dense_reference() -> solver.Dense | None:
-    """Return the reference of the tests where this is a checkout."""
-    if not DENSE_REFERENCE.is_file():
-        return None
-    spec = importlib.util.spec_from_file_location('dense_reference', DENSE_REFERENCE)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    found: solver.Dense = module.solve
-    return found

@@ -1,5 +1,5 @@
-"""The protocols of the literature: which pairs, which matches, which thresholds, which tables.
+"""Protocols: lists of pairs with the truth, and the thresholds within which an answer is right.
 
-`kitti`, `indoor` and `drives` make protocols; `front_end` the matches that all methods share;
-`run` runs them; `tables`, `plots` and `page` show what came out beside `published` rows.
+`kitti`, `indoor`, `posed` and `given` are those of the literature and of posed scans; `scenes` are
+places of the built-in world, `solver` sets of matches to time; `studies` and `ablation` vary them.
 """

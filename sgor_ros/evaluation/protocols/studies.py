@@ -2,7 +2,7 @@
 from collections.abc import Callable
 
 from ...core.common.settings import InputError
-from .front_end import Variant
+from ..pairs.front_end import Variant
 
 COUNTS = (250, 500, 1000, 2000, 4000, 8000)
 CATEGORIES = (1, 2, 3, 5, 8)

@@ -1,0 +1,41 @@
+"""Any folder with poses, keyframes at strides, and the built-in world."""
+from collections.abc import Sequence
+from dataclasses import replace
+
+from ...core.common import se3
+from ...core.config import SgorConfig
+from ...io.datasets import Drive
+from ..pairs.pair import Pair
+from ..pairs.selection import BAND_M
+from ..pairs.selection import near_pairs
+from .protocol import INLIER_M
+from .protocol import KITTI
+from .protocol import Protocol
+
+
+def posed(drives: Sequence[Drive], max_distance_m: float, listed: Sequence[Pair] = ()
+          ) -> Protocol:
+    """Return all pairs of scans of a drive up to a distance, and listed ones, in bands of 10 m."""
+    # as in the tables of the literature heights count, however good they are
+    pairs = [replace(pair, group=_band(pair.distance_m), heights_known=True)
+             for pair in [*near_pairs(drives, max_distance_m), *listed]]
+    return Protocol('poses', pairs, KITTI, INLIER_M, SgorConfig.kitti_protocol())
+
+
+def strided(drives: Sequence[Drive], strides: Sequence[int]) -> Protocol:
+    """Return the pairs of keyframes so many keyframes apart: nuScenes at 2 Hz."""
+    pairs = []
+    for drive in drives:
+        assert drive.T_world_sensor is not None
+        T = drive.T_world_sensor
+        for stride in strides:
+            pairs += [Pair(drive.frames[i + stride], drive.frames[i],
+                           se3.inverse(T[i]) @ T[i + stride],
+                           name=f'{drive.name} {i + stride} {i}', group=f'stride {stride}')
+                      for i in range(len(drive.frames) - stride)]
+    return Protocol('strides', pairs, KITTI, INLIER_M, SgorConfig.kitti_protocol())
+
+
+def _band(distance_m: float) -> str:
+    low = int(distance_m // BAND_M) * int(BAND_M)
+    return f'{low}-{low + int(BAND_M)} m'

@@ -1,0 +1,79 @@
+"""Pairs and drives in the places of the built-in world, most of which repeat themselves."""
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.common import se3
+from ...core.common.settings import InputError
+from ...io.datasets import Drive
+from ...io.datasets import Frame
+from ..pairs.pair import Pair
+from ..pairs.selection import drive_of
+from ..pairs.selection import frame_in_memory
+
+
+def scene_kinds(names: Sequence[str]) -> dict[str, bool]:
+    """Return the kinds asked for, or all, and whether their places repeat themselves.
+
+    Raises
+    ------
+    InputError
+        A name that is none, or no Open3D.
+    """
+    try:
+        from ...world.scenes import KINDS
+    except ImportError as error:
+        raise InputError(f'the built-in world needs Open3D ({error}): '
+                         'pip install open3d') from error
+    for name in names:
+        if name not in KINDS:
+            raise InputError(f'--kinds {name}: not one of {", ".join(KINDS)}')
+    return {name: not KINDS[name].unique for name in names or KINDS}
+
+
+def scene_pairs(kind: str, count: int, seed: int) -> list[Pair]:
+    """Scan places of a kind.
+
+    Parameters
+    ----------
+    kind : str
+        Name of the kind.
+    count : int
+        Places; each gives a pair of its own and a pair with the next one.
+    seed : int
+        Chooses places, poses and noise.
+
+    Returns
+    -------
+    list of Pair
+        First `count` pairs of the same place, then `count` of different places.
+    """
+    from ...world import Lidar
+    from ...world import scenes
+    rng = np.random.default_rng([seed, list(scenes.KINDS).index(kind)])
+    lidar = Lidar()
+    same: list[Pair] = []
+    targets: list[Frame] = []
+    for index in range(count + 1):
+        place = scenes.make(kind, 1000 * seed + index)
+
+        def scan(pose: NDArray[np.float64], role: str, place: scenes.Place = place,
+                 index: int = index) -> Frame:
+            return frame_in_memory(f'{kind}/{index:03d}/{role}', kind,
+                                   *lidar.scan(place, pose, rng))
+
+        T_world_target, T_world_source = scenes.random_pair(place, rng,
+                                                            *scenes.KINDS[kind].distances)
+        targets.append(scan(T_world_target, 'target'))
+        if index < count:
+            same.append(Pair(scan(T_world_source, 'source'), targets[-1],
+                             se3.inverse(T_world_target) @ T_world_source))
+    return same + [Pair(pair.source, target, None, same_place=False)
+                   for pair, target in zip(same, targets[1:], strict=True)]
+
+
+def scene_drive(kind: str, count: int, seed: int) -> Drive:
+    """Drive through the place of a kind and a seed, as far apart as its scans are meant to be."""
+    from ...world import simulate
+    return drive_of(kind, (scan[1:] for scan in simulate(count, seed, place=kind)))
