@@ -22,6 +22,9 @@ COMMANDS = {
 }
 # the built-in world; the module of open3d without CUDA
 OPEN3D = ['open3d-cpu>=0.18']
+# APE and RPE, other methods, matches from depth maps, a cluster to run on, pictures
+EVALUATION = [*OPEN3D, 'evo>=1.28', 'kiss-icp', 'kiss_matcher', 'small_gicp>=1.0', 'igraph',
+              'pillow', 'distributed', 'matplotlib', 'tqdm']
 
 setup(
     name='sgor_ros',
@@ -73,9 +76,9 @@ setup(
         # where no ROS 2 Jazzy is installed: the same rclpy with Fast DDS, as wheels
         'ros': ['ros-jazzy-rclpy[fastrtps]', 'ros-jazzy-common-interfaces'],
         'open3d': OPEN3D,
-        # rivals, their matches from depth maps, and a cluster to run on
-        'benchmark': [*OPEN3D, 'kiss-icp', 'kiss_matcher', 'small_gicp>=1.0', 'igraph', 'pillow',
-                      'distributed'],
+        # sgor_benchmark, sgor_tables, sgor_demo
+        'evaluation': EVALUATION,
+        'benchmark': EVALUATION,    # its name before
         # to run what docs/pose_graph.md shows
         'slam': ['gtsam>=4.3', 'g2opy'],
         # --visualize; needs numpy 2, which the messages of an installed Jazzy do not take

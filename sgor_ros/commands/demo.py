@@ -15,6 +15,8 @@ from tqdm import tqdm
 
 from ..core.common.settings import InputError
 from ..core.config import SgorConfig
+from ..evaluation.metrics.trajectory import trajectory_errors
+from ..evaluation.metrics.trajectory import TrajectoryErrors
 from ..evaluation.report.trajectory_plots import plot_against_truth
 from ..evaluation.report.trajectory_plots import plot_errors
 from ..io.bags import BagReader
@@ -185,7 +187,7 @@ def _compare(player: 'Player', truth: dict[int, Array], world: WorldMap, memory_
         return _fail(f'{len(answered)} odometry messages for {len(sent)} scans; '
                      f'see {out}/node.log')
     stamps = [sent[i] for i in answered]
-    errors = track_errors(np.array([poses[stamp] for stamp in stamps]),
+    errors = trajectory_errors(np.array([poses[stamp] for stamp in stamps]),
                           np.array([truth[stamp] for stamp in stamps]))
     seconds = np.array([float(told[stamp]['seconds']) if stamp in told else np.nan
                         for stamp in stamps])
@@ -217,7 +219,7 @@ def slowness(answered: int, sent: int, seconds: Array, rate: float) -> str:
 
 
 def report(sent: int, counts: dict[str, str], seconds: Array, latency: Array,
-           errors: TrackErrors, memory_mb: list[float]) -> str:
+           errors: TrajectoryErrors, memory_mb: list[float]) -> str:
     """Return the table of the demo; `counts` is what the node told of the last scan."""
     drift = errors.drift
     rows = [
@@ -228,8 +230,8 @@ def report(sent: int, counts: dict[str, str], seconds: Array, latency: Array,
         ('  failed', counts['failed']),
         ('time per scan', _spread(1e3 * seconds, '{:.0f} ms', (50, 95, 99))),
         ('cloud sent to odometry heard', _spread(1e3 * latency, '{:.0f} ms', (50, 95, 99))),
-        ('RE of consecutive pairs', _spread(errors.rotation_deg, '{:.3f} deg')),
-        ('TE of consecutive pairs', _spread(100 * errors.translation_m, '{:.2f} cm')),
+        ('RE of consecutive pairs', _spread(errors.rpe_rotation_deg, '{:.3f} deg')),
+        ('TE of consecutive pairs', _spread(100 * errors.rpe_translation_m, '{:.2f} cm')),
         ('drift', f'{drift.translation_percent:.2f} %, {drift.rotation_deg_per_m:.4f} deg/m'
          if drift.stretches else 'the drive is too short'),
         (f'end of the track, after {errors.length_m:.0f} m',

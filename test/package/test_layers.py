@@ -22,7 +22,7 @@ MAY_IMPORT = {
     'tracker': {'core'},
     'api': {'core', 'tracker'},
     'io': {'core', 'tracker'},
-    'evaluation': {'core', 'tracker', 'io'},
+    'evaluation': {'core', 'tracker', 'io', 'world'},
     'ros': {'core', 'tracker', 'io'},
     'visualize': {'core', 'tracker'},
     'commands': {'core', 'tracker', 'io', 'evaluation', 'ros', 'visualize', 'world'},

@@ -51,8 +51,9 @@ def measure(arguments: Namespace, folder: Path) -> None:
         thresholds = sorted({*np.arange(0.4, 1.0, 0.05).round(2), config.min_confidence})
         texts.append(pair_tables.confidence_table(labelled, thresholds, config.min_confidence)
                      + f'\n\n{sum(row.same_place for row in labelled)} right and '
-                     f'{sum(not row.same_place for row in labelled)} wrong pairs. Answers that the '
-                     'default threshold refused keep the confidence that they were refused with.')
+                     f'{sum(not row.same_place for row in labelled)} wrong pairs. Answers that '
+                     'the default threshold refused keep the confidence that they were refused '
+                     'with.')
     elif not kinds:
         raise InputError('--limit 0 --count 0: nothing is left to do without --per-kind')
     for number, kind in enumerate(kinds, 1):

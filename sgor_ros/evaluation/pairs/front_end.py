@@ -89,8 +89,8 @@ def scans_of(pair: Pair, seed: int | None) -> tuple[Scans, Array | None]:
         turned = se3.transform(T_turned_source, source.points.astype(np.float64))
         source = SemanticScan(turned.astype(np.float32), source.labels)
         truth = None if truth is None else truth @ se3.inverse(T_turned_source)
-    conventions = (frame.label_convention for frame in pair.frames)
-    return Scans(source, target, *conventions, seed or 0), truth
+    of_source, of_target = (frame.label_convention for frame in pair.frames)
+    return Scans(source, target, of_source, of_target, seed or 0), truth
 
 
 def shared_matches(pair: Pair, config: SgorConfig, inlier_m: float, variant: Variant,

@@ -117,5 +117,5 @@ def _far_pairs(drive: Drive) -> Iterator[Pair]:
     T = drive.T_world_sensor
     for i, j in combinations(range(len(drive.frames)), 2):
         if np.linalg.norm(T[i, :3, 3] - T[j, :3, 3]) > NO_OVERLAP_M:
-            yield Pair(drive.frames[j], drive.frames[i], se3.inverse(T[i]) @ T[j], same_place=False,
-                       heights_known=drive.heights_known)
+            yield Pair(drive.frames[j], drive.frames[i], se3.inverse(T[i]) @ T[j],
+                       same_place=False, heights_known=drive.heights_known)

@@ -50,6 +50,7 @@ def _read(cache: Path) -> dict[str, Any]:
 def _icp(pair: Pair) -> Array:
     import open3d as o3d
     registration = o3d.pipelines.registration
+    assert pair.T_target_source is not None
     source, target = (o3d.geometry.PointCloud(o3d.utility.Vector3dVector(
         frame.read().points.astype(np.float64))).voxel_down_sample(VOXEL_M)
         for frame in pair.frames)

@@ -1,4 +1,4 @@
-"""Tables of verdicts and confidence: what was kept and refused, rightly or not, by kind of place."""
+"""Tables of verdicts and confidence: what was kept and refused, rightly or not."""
 from collections.abc import Collection
 from collections.abc import Sequence
 from itertools import pairwise

@@ -16,9 +16,9 @@ from .cells import recall
 from .cells import times
 
 BANDS_M = ((0.0, 10.0), (10.0, 20.0), (20.0, 36.0))
-RULE = (f'Recall: answered, not refused, and within {EASY.rotation_deg:g} deg and {100 * EASY.translation_m:g} cm '
-        'of the truth (nuScenes: in x and y). RE and TE: median / mean over those. Times: median '
-        '/ p95.')
+RULE = (f'Recall: answered, not refused, and within {EASY.rotation_deg:g} deg and '
+        f'{100 * EASY.translation_m:g} cm of the truth (nuScenes: in x and y). RE and TE: median '
+        '/ mean over those. Times: median / p95.')
 
 
 def pairs_table(rows: Sequence[Row], methods: Sequence[str], memory: dict[str, float]) -> str:

@@ -40,7 +40,8 @@ def plot_pairs(path: Path, rows: Sequence[Row], methods: Sequence[str]) -> None:
     """Draw recall by distance, time and errors of each method, which has its line everywhere."""
     figure = new_figure(14, 2.4 + 0.75 * len(methods))
     (recall, slow), (turned, moved) = figure.subplots(2, 2, sharey=True)
-    right = {name: [row for row in rows if row.method == name and row.same_place] for name in methods}
+    right = {name: [row for row in rows if row.method == name and row.same_place]
+             for name in methods}
     _recall(recall, right)
     _spread(slow, {name: [1e3 * row.seconds for row in own] for name, own in right.items()},
             'two raw scans to transform [ms]')
@@ -106,8 +107,10 @@ def plot_confidence(path: Path, rows: Sequence[Row], default: float) -> None:
     figure = new_figure(12, 7.5)
     top, bottom = figure.subplots(2, sharex=True)
     kinds = {'right answers': ([r for r in rows if r.same_place and r.correct], RIGHT),
-             'right pairs, wrong answer': ([r for r in rows if r.same_place and not r.correct], WRONG),
-             'wrong pairs': ([r for r in rows if not r.same_place and not r.correct], DIFFERENT_PLACES)}
+             'right pairs, wrong answer': (
+                 [r for r in rows if r.same_place and not r.correct], WRONG),
+             'wrong pairs': ([r for r in rows if not r.same_place and not r.correct],
+                             DIFFERENT_PLACES)}
     bins = np.linspace(0, 1, 41)
     for name, (part, colour) in kinds.items():
         if part:
@@ -138,7 +141,8 @@ def plot_ablation(path: Path, rows: Sequence[Row], methods: Sequence[str]) -> No
     figure = new_figure(12, 0.36 * len(methods) + 1.5)
     axes, slow = figure.subplots(1, 2, sharey=True)
     own = [[row for row in rows if row.method == name] for name in methods]
-    axes.barh(methods, [registration_recall([row.success for row in part]) for part in own], color=BLUE)
+    axes.barh(methods, [registration_recall([row.success for row in part]) for part in own],
+              color=BLUE)
     slow.barh(methods, [1e3 * np.median([row.seconds for row in part]) for part in own],
               color=ORANGE)
     axes.invert_yaxis()

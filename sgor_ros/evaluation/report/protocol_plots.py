@@ -51,7 +51,8 @@ def errors(path: Path, rows: Sequence[Row], threshold: Threshold) -> None:
     for place, (method, own) in enumerate(by_method(rows).items()):
         for axes, values, most in (
                 (left, [r.rotation_error_deg for r in own], threshold.rotation_deg),
-                (right, [100 * r.translation_error_m for r in own], 100 * threshold.translation_m)):
+                (right, [100 * r.translation_error_m for r in own],
+                 100 * threshold.translation_m)):
             known = np.sort(np.nan_to_num(values, nan=np.inf))
             share = 100 * np.arange(1, len(known) + 1) / len(known)
             axes.step([0, *known.clip(max=2 * most)], [0, *share], where='post',

@@ -138,7 +138,8 @@ def plot_errors(path: Path, errors: TrajectoryErrors, scans: NDArray[np.int_], s
     """
     figure = new_figure(12, 7.5)
     top, middle, bottom = figure.subplots(3, sharex=True)
-    _draw_series(top, scans[1:], 100 * errors.rpe_translation_m, 'TE of the pair [cm]', '{:.2f} cm')
+    _draw_series(top, scans[1:], 100 * errors.rpe_translation_m, 'TE of the pair [cm]',
+                 '{:.2f} cm')
     _draw_series(middle, scans[1:], errors.rpe_rotation_deg, 'RE of the pair [deg]', '{:.3f} deg')
     _draw_times(bottom, scans, seconds, period_s)
     bottom.set_xlabel('scan')
