@@ -4,23 +4,23 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from sgor_ros.evaluation.methods.spectral import spectral_matching
-from sgor_ros.evaluation.protocols.tables import percent
 
 from sgor_ros import SgorConfig
 from sgor_ros.core.common import se3
 from sgor_ros.evaluation.methods import Matches
-from sgor_ros.evaluation.methods import rivals
-from sgor_ros.evaluation.methods import sgor
+from sgor_ros.evaluation.methods import rivals_on_matches
 from sgor_ros.evaluation.methods.compatibility import leading_eigenvector
 from sgor_ros.evaluation.methods.compatibility import length_differences
 from sgor_ros.evaluation.methods.compatibility import with_values
 from sgor_ros.evaluation.methods.mac import _selected
 from sgor_ros.evaluation.methods.sc2_pcr import _seeds
 from sgor_ros.evaluation.methods.sc2_pcr import sc2_pcr
+from sgor_ros.evaluation.methods.sgor import on_matches
+from sgor_ros.evaluation.methods.spectral_matching import spectral_matching
 from sgor_ros.evaluation.metrics import kept_scores
 from sgor_ros.evaluation.metrics import rotation_error_deg
 from sgor_ros.evaluation.metrics import translation_error_m
+from sgor_ros.evaluation.report.cells import percent
 
 SETS = Path(__file__).resolve().parents[3] / 'shared/data/correspondences'
 T_TRUE = se3.compose(Rotation.from_euler('zyx', [0.7, 0.05, -0.1]).as_matrix(),
@@ -157,23 +157,23 @@ def test_spectral_matching_keeps_a_tenth():
     assert translation_error_m(solution.T_target_source, T_TRUE) < 0.3
 
 
-@pytest.mark.parametrize('name', ['SGOR', *rivals(print)])
+@pytest.mark.parametrize('name', ['SGOR', *rivals_on_matches(print)])
 def test_nothing_to_find_is_no_error(name):
     """Two matches, and many that agree in nothing: None or some transformation, no exception."""
-    method = {'SGOR': sgor(SgorConfig.paper()), **rivals(print)}[name]
+    method = {'SGOR': on_matches('SGOR', SgorConfig.paper()), **rivals_on_matches(print)}[name]
     rng = np.random.default_rng(0)
     for count in (2, 200):
-        solution = method(Matches.of(rng.uniform(-50, 50, (count, 3)),
+        solution = method.run(Matches.of(rng.uniform(-50, 50, (count, 3)),
                                      rng.uniform(-50, 50, (count, 3)), 0.1))
         assert solution.T_target_source is None or solution.T_target_source.shape == (4, 4)
 
 
-@pytest.mark.parametrize('name', ['SGOR', *(name for name in rivals(print) if name != 'FGR')])
+@pytest.mark.parametrize('name', ['SGOR', *(name for name in rivals_on_matches(print) if name != 'FGR')])
 def test_each_method_solves_an_easy_case(name):
     """A third of 300 right: published figures of all but FGR are near 100 % there."""
-    method = {'SGOR': sgor(SgorConfig.paper()), **rivals(print)}[name]
+    method = {'SGOR': on_matches('SGOR', SgorConfig.paper()), **rivals_on_matches(print)}[name]
     matches = made_up(300, 100, 3)
-    found = method(matches).T_target_source
+    found = method.run(matches).T_target_source
     assert rotation_error_deg(found, T_TRUE) < 1.5
     assert translation_error_m(found, T_TRUE) < 0.3
 
@@ -193,10 +193,10 @@ def test_published_behaviour_on_real_matches(name):
         limit = (0.6, 5.0, 0.6)
     truth = np.loadtxt(SETS / f'{name}_T_target_source.txt')
     matches = Matches.of(source, target, limit[0])
-    methods = rivals(print)
+    methods = rivals_on_matches(print)
     right = {}
     for method in ('SC2-PCR', 'MAC', 'SM'):
-        T = methods[method](matches).T_target_source
+        T = methods[method].run(matches).T_target_source
         right[method] = (rotation_error_deg(T, truth) < limit[1]
                          and translation_error_m(T, truth) < limit[2])
     assert right['SC2-PCR']

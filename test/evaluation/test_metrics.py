@@ -7,6 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from sgor_ros import InputError
 from sgor_ros.evaluation import metrics
+from sgor_ros.evaluation.metrics import kitti_drift
 
 
 def pose(x=0.0, y=0.0, z=0.0, yaw_deg=0.0):
@@ -47,7 +48,7 @@ def test_inlier_scores_are_zero_where_nothing_is_right():
 def test_drift_of_a_scaled_straight_line_is_the_scale_error():
     truth = np.array([pose(x=i) for i in range(21)])
     estimate = np.array([pose(x=1.02 * i) for i in range(21)])
-    drift = metrics.drift(estimate, truth, (5.0, 10.0, 50.0))
+    drift = kitti_drift(estimate, truth, (5.0, 10.0, 50.0))
     assert drift.translation_percent == pytest.approx(2.0)
     assert drift.rotation_deg_per_m == pytest.approx(0.0, abs=1e-9)
     assert drift.stretches == 16 + 11    # the 50 m do not fit
@@ -56,7 +57,7 @@ def test_drift_of_a_scaled_straight_line_is_the_scale_error():
 def test_drift_of_a_turning_estimate():
     truth = np.array([pose(x=i) for i in range(11)])
     estimate = np.array([pose(x=i, yaw_deg=0.1 * i) for i in range(11)])
-    drift = metrics.drift(estimate, truth, (10.0,))
+    drift = kitti_drift(estimate, truth, (10.0,))
     assert drift.rotation_deg_per_m == pytest.approx(0.1)
     # the end is where it should be in the first frame, and so it is in the last
     assert drift.translation_percent == pytest.approx(0.0, abs=1e-9)
@@ -65,24 +66,73 @@ def test_drift_of_a_turning_estimate():
 def test_drift_does_not_see_the_frame_of_the_trajectory():
     truth = np.array([pose(x=math.cos(a), y=math.sin(a), yaw_deg=math.degrees(a))
                       for a in np.linspace(0, 6, 50)])
-    drift = metrics.drift(pose(3, 4, 5, yaw_deg=33) @ truth, truth, (1.0, 2.0))
+    drift = kitti_drift(pose(3, 4, 5, yaw_deg=33) @ truth, truth, (1.0, 2.0))
     assert drift.stretches > 0
     assert drift.translation_percent == pytest.approx(0.0, abs=1e-9)
     assert drift.rotation_deg_per_m == pytest.approx(0.0, abs=1e-6)
 
 
 def test_drift_without_a_stretch_is_not_a_number():
-    drift = metrics.drift(np.array([pose()]), np.array([pose()]))
+    drift = kitti_drift(np.array([pose()]), np.array([pose()]))
     assert math.isnan(drift.translation_percent)
     assert drift.stretches == 0
     with pytest.raises(InputError, match=r'\(2, 4, 4\)'):
-        metrics.drift(np.zeros((2, 4, 4)), np.zeros((3, 4, 4)))
+        kitti_drift(np.zeros((2, 4, 4)), np.zeros((3, 4, 4)))
 
 
-def test_consecutive_errors_blame_the_step_that_is_wrong():
+def test_rpe_blames_the_step_that_is_wrong():
     truth = np.array([pose(x=i) for i in range(4)])
     estimate = truth.copy()
     estimate[2:] = [pose(2.3, yaw_deg=2), pose(2.3) @ pose(yaw_deg=2) @ pose(1)]
-    rotation, translation = metrics.consecutive_errors(estimate, truth)
+    rotation, translation = metrics.rpe(estimate, truth)
     assert rotation == pytest.approx([0, 2, 0], abs=1e-6)
     assert translation == pytest.approx([0, 0.3, 0], abs=1e-9)
+
+
+def made_trajectories(step_m, count=120):
+    """Return a winding drive with equal steps, and an estimate of it with noise."""
+    rng = np.random.default_rng(0)
+    truth, estimate = [np.eye(4)], [pose(5, -3, 1, yaw_deg=40)]
+    for i in range(count):
+        step = pose(step_m, yaw_deg=2 * math.sin(i / 9))
+        off = pose(*rng.normal(0, 0.02, 3), yaw_deg=rng.normal(0, 0.1))
+        truth.append(truth[-1] @ step)
+        estimate.append(estimate[-1] @ step @ off)
+    return np.array(estimate), np.array(truth)
+
+
+def test_ape_and_rpe_are_their_formulas():
+    """What was printed before evo: by numpy, pose by pose."""
+    estimate, truth = made_trajectories(1.0)
+    assert metrics.ape(estimate, truth) == pytest.approx(
+        np.linalg.norm(estimate[:, :3, 3] - truth[:, :3, 3], axis=1), rel=1e-12)
+    steps = [(np.linalg.inv(a) @ b, np.linalg.inv(c) @ d) for a, b, c, d in zip(
+        estimate, estimate[1:], truth, truth[1:], strict=False)]
+    rotation, translation = metrics.rpe(estimate, truth)
+    assert rotation == pytest.approx(
+        [metrics.rotation_error_deg(*step) for step in steps], abs=1e-9)
+    assert translation == pytest.approx(
+        [metrics.translation_error_m(*step) for step in steps], abs=1e-12)
+    assert translation.max() > 0.02
+    assert [len(each) for each in metrics.rpe(estimate[:1], truth[:1])] == [0, 0]
+
+
+@pytest.mark.parametrize('length', [10, 25, 40])
+def test_drift_is_rpe_of_evo_where_both_take_the_same_stretches(length):
+    """With steps of 1 m the first pose beyond a length is the nearest to it, too."""
+    from evo.core.metrics import PoseRelation
+    from evo.core.metrics import RPE
+    from evo.core.metrics import Unit
+    from evo.core.trajectory import PosePath3D
+    estimate, truth = made_trajectories(1.0)
+    # an edge of a float is on the same side for both
+    drift = kitti_drift(estimate, truth, (length - 1e-6,))
+    both = tuple(PosePath3D(poses_se3=list(poses)) for poses in (truth, estimate))
+    means = []
+    for relation in (PoseRelation.translation_part, PoseRelation.rotation_angle_deg):
+        rpe = RPE(relation, length, Unit.meters, all_pairs=True, pairs_from_reference=True)
+        rpe.process_data(both)
+        assert len(rpe.error) == drift.stretches == 121 - length
+        means.append(np.mean(rpe.error) / length)
+    assert drift.translation_percent == pytest.approx(100 * means[0], rel=1e-6)
+    assert drift.rotation_deg_per_m == pytest.approx(means[1], rel=1e-6)

@@ -3,14 +3,15 @@ import sys
 
 import numpy as np
 import pytest
-from sgor_ros.evaluation.rivals import kiss_icp
-from sgor_ros.evaluation.rivals import scan_to_scan
-from sgor_ros.evaluation.run import rivals
-from sgor_ros.evaluation.run import sample_of
 
-from sgor_ros.evaluation import pairs as pairing
+from sgor_ros.evaluation.methods import rivals_on_scans
+from sgor_ros.evaluation.methods.odometries import kiss_icp
+from sgor_ros.evaluation.methods.odometries import scan_to_scan
 from sgor_ros.evaluation.metrics import rotation_error_deg
 from sgor_ros.evaluation.metrics import translation_error_m
+from sgor_ros.evaluation.pairs import selection
+from sgor_ros.evaluation.pairs.front_end import scans_of
+from sgor_ros.evaluation.pairs.pair import Pair
 
 NAMES = {'kiss-matcher-0.3': 'kiss_matcher', 'kiss-matcher-0.5': 'kiss_matcher',
          'ransac': 'open3d', 'fgr': 'open3d'}
@@ -18,25 +19,25 @@ NAMES = {'kiss-matcher-0.3': 'kiss_matcher', 'kiss-matcher-0.5': 'kiss_matcher',
 
 @pytest.fixture(scope='module')
 def drive(street):
-    return pairing.drive_of('street', street)
+    return selection.drive_of('street', street)
 
 
 @pytest.mark.parametrize('name', ['kiss-matcher-0.3', 'kiss-matcher-0.5', 'ransac'])
 def test_a_rival_finds_an_easy_pair(name, drive):
     pytest.importorskip(NAMES[name])
-    sample, truth = sample_of(pairing.near_pairs([drive], 2.0)[0], seed=1)
-    answer = rivals(print)[name].run(sample)
+    sample, truth = scans_of(selection.near_pairs([drive], 2.0)[0], 1)
+    answer = rivals_on_scans(print)[name].run(sample)
     assert rotation_error_deg(answer.T_target_source, truth) < 5
     assert translation_error_m(answer.T_target_source, truth) < 0.6
-    assert answer.valid
+    assert answer.accepted
     assert answer.seconds > 0
 
 
 def test_fast_global_registration_finds_a_cloud_in_itself(drive):
     pytest.importorskip('open3d')
     frame = drive.frames[0]
-    sample, truth = sample_of(pairing.Pair(frame, frame, np.eye(4)), seed=1)
-    answer = rivals(print)['fgr'].run(sample)
+    sample, truth = scans_of(Pair(frame, frame, np.eye(4)), 1)
+    answer = rivals_on_scans(print)['fgr'].run(sample)
     assert rotation_error_deg(answer.T_target_source, truth) < 5
     assert translation_error_m(answer.T_target_source, truth) < 0.6
 
@@ -56,5 +57,5 @@ def test_an_odometry_follows_the_street(make, drive):
 def test_rivals_that_are_not_installed_are_left_out_and_named(monkeypatch):
     monkeypatch.setitem(sys.modules, 'kiss_matcher', None)
     said = []
-    assert not [name for name in rivals(said.append) if name.startswith('kiss-matcher')]
+    assert not [name for name in rivals_on_scans(said.append) if name.startswith('kiss-matcher')]
     assert any('kiss_matcher is not installed' in text for text in said)
