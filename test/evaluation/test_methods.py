@@ -168,7 +168,8 @@ def test_nothing_to_find_is_no_error(name):
         assert solution.T_target_source is None or solution.T_target_source.shape == (4, 4)
 
 
-@pytest.mark.parametrize('name', ['SGOR', *(name for name in rivals_on_matches(print) if name != 'FGR')])
+@pytest.mark.parametrize('name', ['SGOR', *(name for name in rivals_on_matches(print)
+                                            if name != 'FGR')])
 def test_each_method_solves_an_easy_case(name):
     """A third of 300 right: published figures of all but FGR are near 100 % there."""
     method = {'SGOR': on_matches('SGOR', SgorConfig.paper()), **rivals_on_matches(print)}[name]

@@ -104,7 +104,8 @@ def test_the_table_has_a_line_for_each_kind_and_method():
             row(group='field', method='n', valid=False),
             row(group='field', right=False, within=False)]
     table = [[cell.strip() for cell in line.strip('|').split('|')]
-             for line in consistency_tables.trust_table(rows, ['m', 'n'], {'tunnel'}).splitlines()[2:]]
+             for line in consistency_tables.trust_table(
+                 rows, ['m', 'n'], {'tunnel'}).splitlines()[2:]]
     lines = {cells[0]: cells[1:] for cells in table}
     assert list(lines) == ['tunnel (repeats): m', 'tunnel (repeats): n', 'field: m', 'field: n',
                            '**all**: m', '**all**: n']
@@ -113,8 +114,8 @@ def test_the_table_has_a_line_for_each_kind_and_method():
                                  '100 %']
     assert lines['field: n'][:4] == ['1', '0', '1', '0']
     assert lines['**all**: m'][:4] == ['2', '1', '0', '1']
-    assert 'm: wrong 2 of 3 (1 wrong answers and 1 pairs of different places' in consistency_tables.wrong_claims(
-        rows, ['m'])
+    claims = consistency_tables.wrong_claims(rows, ['m'])
+    assert 'm: wrong 2 of 3 (1 wrong answers and 1 pairs of different places' in claims
 
 
 def test_reliability_asks_all_candidates_refused_ones_too():
