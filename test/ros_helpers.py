@@ -6,9 +6,9 @@ from scipy.spatial.transform import Rotation
 
 from sgor_ros.io.messages import point_cloud2
 from sgor_ros.io.messages import stamp_ns_of
-from sgor_ros.ros.player import Player
-from sgor_ros.ros.player import SETTLING_S
-from sgor_ros.ros.player import values_of
+from sgor_ros.ros.playback.player import Player
+from sgor_ros.ros.playback.player import SETTLING_S
+from sgor_ros.ros.playback.player import values_of
 from sgor_ros.ros.types import ros_type
 from sgor_ros.world import Lidar
 from sgor_ros.world import simulate

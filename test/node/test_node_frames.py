@@ -19,7 +19,7 @@ from sgor_ros.io.frames import parse_transform
 from sgor_ros.io.messages import matrix_of
 from sgor_ros.io.messages import matrix_of_transform
 from sgor_ros.io.messages import transform_stamped
-from sgor_ros.ros.player import NodeProcess
+from sgor_ros.ros.playback.node_process import NodeProcess
 from sgor_ros.ros.types import ros_type
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -155,7 +155,7 @@ def test_without_a_transform_to_the_base_nothing_is_published(domain, scans, tmp
 
 @pytest.mark.skipif(INSTALLED['tf2_ros'], reason='tf2_ros is installed')
 def test_a_base_that_nothing_leads_to_is_refused(domain):
-    ran = subprocess.run([sys.executable, '-m', 'sgor_ros.ros.node', '--ros-args', '-p',
+    ran = subprocess.run([sys.executable, '-m', 'sgor_ros.ros.main', '--ros-args', '-p',
                           'base_frame:=base_link'], env=domain.environment(), cwd=ROOT,
                          capture_output=True, text=True, timeout=60)
     assert ran.returncode == 2
