@@ -38,7 +38,7 @@ def tf2_extrinsic(node: Node, base_frame: str) -> Extrinsic:
             found = buffer.lookup_transform(
                 base_frame, sensor_frame, Time(nanoseconds=stamp_ns),
                 timeout=Duration(seconds=PATIENCE_S))
-        except tf2_ros.TransformException as error:
+        except (tf2_ros.TransformException, ValueError) as error:    # a time before 1970
             return f'no transform from {sensor_frame} to {base_frame}: {error}'
         return matrix_of_transform(found.transform)
 
