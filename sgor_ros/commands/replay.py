@@ -57,8 +57,7 @@ def main(argv: list[str] | None = None) -> int:
 
 def replay(arguments: Namespace) -> int:
     """Track the scans of a bag or folder and write the results; 1 where none was registered."""
-    parameters = read_parameters(arguments, [
-        *SgorConfig.settings(), *TrackerConfig.settings(), *StreamConfig.settings()])
+    parameters = read_parameters(arguments, SgorConfig, TrackerConfig, StreamConfig)
     stream = configured(StreamConfig(), arguments, parameters)
     mount = extrinsic.configured(stream)
     if stream.base_frame and mount is None:
@@ -157,10 +156,9 @@ def _parser() -> Parser:
     add_visualize(command)
     add_params_file(command)
     add_preset(command)
-    add_settings(command, 'clouds and frames', StreamConfig.settings())
-    add_settings(command, 'tracker', TrackerConfig.settings())
-    add_settings(command, 'registration (defaults are those of the preset outdoor)',
-                 SgorConfig.settings())
+    add_settings(command, 'clouds and frames', StreamConfig)
+    add_settings(command, 'tracker', TrackerConfig)
+    add_settings(command, 'registration (defaults are those of the preset outdoor)', SgorConfig)
     return command
 
 

@@ -24,10 +24,6 @@ from .verdict.decision import Pair
 from .verdict.decision import refuse
 from .verdict.result import Registration
 
-LEAST_CONFIDENCE = SgorConfig().min_confidence
-"""A lower `min_confidence` does not hold here: whoever accepts any answer of `register` would
-never hear of another one."""
-
 
 def check_prediction(source: PreparedScan, target: PreparedScan,
                      T_target_source: NDArray[np.float64], config: SgorConfig) -> Registration:
@@ -53,17 +49,15 @@ def check_prediction(source: PreparedScan, target: PreparedScan,
     Raises
     ------
     InputError
-        The scans are prepared at two scales; or `rival_radius` is 0, for without competing
+        The scans are prepared at two scales; or `hypothesis_radius` is 0, for without competing
         hypotheses nothing is confirmed.
     """
     if source.scale != target.scale:
         raise InputError(f'source: prepared at scale {source.scale:g}, target at {target.scale:g}')
-    if config.rival_radius == 0:
-        raise InputError('rival_radius = 0: a prediction has to compete with others')
+    if config.hypothesis_radius == 0:
+        raise InputError('hypothesis_radius = 0: a prediction has to compete with others')
     clock = Stopwatch()
     config = config.scaled(source.scale)
-    if config.min_confidence < LEAST_CONFIDENCE:
-        config = config.replace(min_confidence=LEAST_CONFIDENCE)
     with cores(config.threads):
         test, alignment = run_both(
             config.threads, partial(_compete, source, target, T_target_source, config, clock),

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from numpy.typing import NDArray
 
+from .common.settings import InputError
 from .config import SgorConfig
 from .execution.stopwatch import Stopwatch
 from .execution.tasks import run_both
@@ -65,7 +66,7 @@ def register(source: Scan | ArrayLike, target: Scan | ArrayLike,
         Prepared scans are used as they are: prepare once, register often. Arrays are points
         without labels, metres.
     config : SgorConfig, optional
-        ``SgorConfig()`` where none is given.
+        Where none is given, that of a prepared scan, or ``SgorConfig()``.
 
     Returns
     -------
@@ -75,10 +76,10 @@ def register(source: Scan | ArrayLike, target: Scan | ArrayLike,
     Raises
     ------
     InputError
-        What is no scan, or no configuration.
+        What is no scan, or no configuration; a scan that was prepared with another one.
     """
-    config = SgorConfig.given(config)
     scans = as_scan(source, 'source'), as_scan(target, 'target')
+    config = _configuration(*scans, config)
     clock = Stopwatch()
     with cores(config.threads):
         one, other = _prepared(*scans, config, clock)
@@ -96,6 +97,22 @@ def register(source: Scan | ArrayLike, target: Scan | ArrayLike,
                 result = decide(pair, found.test, alignment, config)
         hints = _hints(result, one, other, config)
     return replace(result, warnings=(*result.warnings, *hints)) if hints else result
+
+
+def _configuration(source: Scan, target: Scan, asked: SgorConfig | None) -> SgorConfig:
+    """Return the configuration to register with; prepared scans bring theirs, or fit it."""
+    prepared = {name: scan for name, scan in (('source', source), ('target', target))
+                if isinstance(scan, PreparedScan)}
+    if asked is None and prepared:
+        config = next(iter(prepared.values())).config
+    else:
+        config = SgorConfig.given(asked)
+    for name, scan in prepared.items():
+        scan.check(config, name)
+        if asked is not None and config.scale not in (0.0, scan.scale):
+            raise InputError(f'{name}: prepared at scale {scan.scale:g}, not at {config.scale:g}; '
+                             'preprocess it with the configuration of the registration')
+    return config
 
 
 def _prepared(one: Scan, other: Scan, config: SgorConfig, clock: Stopwatch
@@ -182,6 +199,8 @@ def _attempt(source: PreparedScan, target: PreparedScan, config: SgorConfig, clo
 def aligned(source: PreparedScan, target: PreparedScan, T_target_source: NDArray[np.float64],
             config: SgorConfig, clock: Stopwatch) -> Alignment | None:
     """Refine a transformation on the clouds; None where that is off or they are too small."""
+    if not config.local_refinement:
+        return None
     with clock('surface'):
         p, q = run_both(config.threads, source.surfaced, target.surfaced)
     if p is None or q is None:

@@ -95,10 +95,10 @@ class Pipeline:
         tracked = self._track(points, scan.stamp_ns, frame)
         seconds = time.perf_counter() - begin
         placed = self._place(tracked, frame)
-        reference_frame = self._keyframe_frames.get(tracked.reference_stamp_ns or 0, frame)
-        if tracked.keyframe:
+        reference_frame = self._keyframe_frames.get(tracked.reference_id or 0, frame)
+        if tracked.keyframe_id is not None:
             self._keyframe_frames = dict(list(self._keyframe_frames.items())[-KEYFRAMES:])
-            self._keyframe_frames[tracked.stamp_ns] = frame
+            self._keyframe_frames[tracked.keyframe_id] = frame
         published = ([] if self._sink is None else
                      list(self._messages(self._sink, tracked, placed, frame, reference_frame)))
         reason, T_odom_child = ((placed, None) if isinstance(placed, str)

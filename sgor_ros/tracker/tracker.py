@@ -22,6 +22,9 @@ from .choice import Step
 from .choice import UNKNOWN_COVARIANCE
 from .config import TrackerConfig
 from .covariance import PoseCovariance
+from .keyframe_selection import is_keyframe
+from .keyframe_selection import is_new_place
+from .keyframe_selection import overlap
 from .keyframes import Keyframe
 from .keyframes import Keyframes
 from .motion import Motion
@@ -68,6 +71,7 @@ class Tracker:
         self.tracker_config = TrackerConfig.given(tracker_config)
         self._late = 0
         self._tracks = 0
+        self._ids = 0
         self.reset()
 
     def reset(self) -> None:
@@ -117,10 +121,11 @@ class Tracker:
         step = self._predicted_step(new) or self._step(new, self._reference)
         if isinstance(step, Step):
             # in a new track each new place is a chance to find back to an old track
-            elsewhere = self._is_elsewhere(step.T_reference_sensor)
-            older = self._recognise(new, 1, earlier=True) if elsewhere else None
+            new_place = is_new_place(step.T_reference_sensor, self._reference,
+                                     self._last_keyframe(), self.tracker_config)
+            older = self._relocalise(new, 1, earlier=True) if new_place else None
             return self._accept(new, older or step)
-        other = self._recognise(new, self.tracker_config.retries)
+        other = self._relocalise(new, self.tracker_config.retries)
         return self._fail(new, step) if other is None else self._accept(new, other)
 
     def _forget(self) -> None:
@@ -129,7 +134,7 @@ class Tracker:
         self._motion = Motion.unknown(0, np.eye(4), np.zeros((6, 6)), self.tracker_config)
         self._track_id = self._tracks
         self._failures = 0
-        self._sure = False
+        self._registered = False
 
     def _drop(self, stamp_ns: int) -> TrackedScan:
         self._late += 1
@@ -156,14 +161,29 @@ class Tracker:
         self._tracks += 1
         self._track_id = self._tracks
         self._failures = 0
-        self._sure = False
+        self._registered = False
         origin = PoseCovariance.origin()
-        self._reference = Keyframe(new.prepared, new.stamp_ns, self._track_id, np.eye(4), origin)
+        self._reference = self._keyframe(new, np.eye(4), origin)
         self._motion = Motion.unknown(new.stamp_ns, np.eye(4), np.zeros((6, 6)),
                                       self.tracker_config)
         self._keyframes.add(self._reference, self.tracker_config.max_keyframes)
+        c = self.tracker_config
+        if c.predict_first and self.config.hypothesis_radius == 0:
+            new.warnings.append('predict_first: SGOR registers every scan all the same, for '
+                                'hypothesis_radius is 0')
         return replace(self._result(new, State.NEW_TRACK), success=True, T_odom_sensor=np.eye(4),
-                       covariance=origin.pose, keyframe=True, restarted=True)
+                       covariance=origin.pose, keyframe=True, keyframe_id=self._reference.id,
+                       restarted=True)
+
+    def _keyframe(self, new: _Scan, T_odom_sensor: Array, covariance: PoseCovariance | None
+                  ) -> Keyframe:
+        """Make a scan one that others can be registered to."""
+        self._ids += 1
+        return Keyframe(self._ids, new.prepared, new.stamp_ns, self._track_id, T_odom_sensor,
+                        covariance)
+
+    def _last_keyframe(self) -> Keyframe | None:
+        return self._keyframes.last(self._track_id)
 
     def _predicted_step(self, new: _Scan) -> Step | None:
         """Test the predicted motion; return a step if it convinces, and None if SGOR is to run.
@@ -175,16 +195,19 @@ class Tracker:
         assert self._reference is not None
         prediction = motion.predict(new.stamp_ns, c)
         T = prediction.T_reference_sensor
-        if not (c.predict_first and self.config.rival_radius > 0 and self._sure
-                and not self._failures and prediction.is_narrow() and self._stays(T)):
+        if not (c.predict_first and self.config.hypothesis_radius > 0 and self._registered
+                and not self._failures and prediction.is_narrow() and self._keeps_keyframe(T)):
             return None
         self._reference = self._reference.ready(self.config)
         if new.prepared.scale != self._reference.prepared.scale:
             return None
-        found = check_prediction(new.prepared, self._reference.prepared, T, self.config)
+        config = self.config
+        if config.min_confidence < c.min_prediction_confidence:
+            config = config.replace(min_confidence=c.min_prediction_confidence)
+        found = check_prediction(new.prepared, self._reference.prepared, T, config)
         new.spent(found.timings)
         if (not found.success or found.T_target_source is None
-                or not self._stays(found.T_target_source, found)
+                or not self._keeps_keyframe(found.T_target_source, found)
                 or not is_likely(found, prediction)):
             return None
         step = Step(found.T_target_source, found.covariance, found.correlated_error)
@@ -193,13 +216,21 @@ class Tracker:
         new.registration, new.reference, new.confirmed = found, self._reference, True
         return step
 
+    def _keeps_keyframe(self, T_reference_sensor: Array, found: Registration | None = None
+                        ) -> bool:
+        """Whether a scan that was found there makes no new keyframe."""
+        assert self._reference is not None
+        last, c = self._last_keyframe(), self.tracker_config
+        return not (is_new_place(T_reference_sensor, self._reference, last, c)
+                    or is_keyframe(T_reference_sensor, found, self._reference, last, c))
+
     def _step(self, new: _Scan, keyframe: Keyframe) -> Step | str:
         """Register a scan to a keyframe; return the step to it, or why there is none."""
         keyframe = keyframe.ready(self.config)
         found = register(new.prepared, keyframe.prepared, self.config)
         new.spent(found.timings)
         assert self._reference is not None
-        if keyframe.stamp_ns == self._reference.stamp_ns:
+        if keyframe.id == self._reference.id:
             self._reference = keyframe
             step = choose(found, self._motion_before(new.stamp_ns), new.stamp_ns,
                           self.tracker_config, lambda placement: refined(
@@ -230,7 +261,7 @@ class Tracker:
         return motion if motion.stamp_ns < stamp_ns else Motion.unknown(
             stamp_ns - 1, motion.T_reference_sensor, motion.pose_covariance, self.tracker_config)
 
-    def _recognise(self, new: _Scan, tries: int, *, earlier: bool = False) -> Step | None:
+    def _relocalise(self, new: _Scan, tries: int, *, earlier: bool = False) -> Step | None:
         """Try other keyframes, or those of earlier tracks; each scan a few, in turns."""
         assert self._reference is not None
         for keyframe in self._keyframes.in_turns(tries, self._reference,
@@ -250,7 +281,7 @@ class Tracker:
         moving = self._move(new, keyframe, step)
         assert new.registration is not None
         self._reference, self._track_id, self._failures = keyframe, keyframe.track_id, 0
-        self._sure = new.registration.success
+        self._registered = new.registration.success
         T_odom_sensor = keyframe.T_odom_sensor @ T
         covariance = None
         if keyframe.covariance is not None and step.covariance is not None:
@@ -265,18 +296,17 @@ class Tracker:
                               if moving and step.covariance is not None else None),
             T_reference_sensor=T, reference_covariance=step.covariance)
         c = self.tracker_config
-        kept = self._makes_keyframe(T, new.registration)
+        kept = is_keyframe(T, new.registration, self._reference, self._last_keyframe(), c)
         if keyframe.first_overlap is None:
-            self._reference = replace(self._reference, first_overlap=_overlap(new.registration))
+            self._reference = replace(self._reference, first_overlap=overlap(new.registration))
         if (len(new.prepared.features.points) < c.min_keypoints
                 or (not kept and c.mode == 'keyframe')):
             return result
-        self._reference = Keyframe(new.prepared, new.stamp_ns, self._track_id, T_odom_sensor,
-                                   covariance)
+        self._reference = self._keyframe(new, T_odom_sensor, covariance)
         self._motion = self._motion.at_new_reference()
         if kept:
             self._keyframes.add(self._reference, self.tracker_config.max_keyframes)
-        return replace(result, keyframe=True)
+        return replace(result, keyframe=True, keyframe_id=self._reference.id)
 
     def _move(self, new: _Scan, keyframe: Keyframe, step: Step) -> bool:
         """Take in the motion of a step; return whether the velocity is known."""
@@ -285,7 +315,7 @@ class Tracker:
         before = self._motion
         if step.fused is not None:
             self._motion = step.fused
-        elif (keyframe.stamp_ns == self._reference.stamp_ns and before.stamp_ns < new.stamp_ns
+        elif (keyframe.id == self._reference.id and before.stamp_ns < new.stamp_ns
               and self._failures < self.tracker_config.max_failures):
             self._motion = before.measured(new.stamp_ns, step.T_reference_sensor, covariance)
         else:
@@ -315,37 +345,5 @@ class Tracker:
             new.stamp_ns, False, '', None, None, None, new.registration,
             None if new.reference is None else new.reference.stamp_ns, False, False,
             tuple(new.warnings), new.timings, state, self._track_id, failures=self._failures,
-            late=self._late, confirmed=new.confirmed)
-
-    def _makes_keyframe(self, T_reference_sensor: Array, found: Registration | None = None
-                        ) -> bool:
-        """Whether a scan that was found there is to be remembered."""
-        assert self._reference is not None
-        c, first = self.tracker_config, self._reference.first_overlap
-        if c.mode == 'consecutive':
-            return self._is_elsewhere(T_reference_sensor)
-        return _is_far(T_reference_sensor, c) or (
-            found is not None and first is not None
-            and _overlap(found) < c.keyframe_overlap * first)
-
-    def _stays(self, T_reference_sensor: Array, found: Registration | None = None) -> bool:
-        """Whether a scan that was found there changes nothing of the keyframes."""
-        return not (self._is_elsewhere(T_reference_sensor)
-                    or self._makes_keyframe(T_reference_sensor, found))
-
-    def _is_elsewhere(self, T_reference_sensor: Array) -> bool:
-        """Whether a scan is far from the newest keyframe that is remembered of this track."""
-        last = self._keyframes.last(self._track_id)
-        assert self._reference is not None
-        return last is None or _is_far(
-            se3.inverse(last.T_odom_sensor) @ self._reference.T_odom_sensor @ T_reference_sensor,
-            self.tracker_config)
-
-
-def _overlap(found: Registration) -> float:
-    return 0.0 if found.score is None else found.score.overlap
-
-
-def _is_far(T: Array, config: TrackerConfig) -> bool:
-    return (float(np.linalg.norm(T[:3, 3])) > config.keyframe_distance
-            or se3.angle(T[:3, :3]) > config.keyframe_angle)
+            late=self._late, confirmed=new.confirmed,
+            reference_id=None if new.reference is None else new.reference.id)

@@ -79,16 +79,16 @@ class HypothesisTest:
 
 def compete(source: ScanIndex, target: ScanIndex, T_target_source: Array, hypotheses: Array,
             config: SgorConfig) -> HypothesisTest:
-    """Test a pose against others, or score it alone where `rival_radius` is 0.
+    """Test a pose against others, or score it alone where `hypothesis_radius` is 0.
 
     One that scores too low gets more rounds of ICP: none is refused for a fit on its way.
     """
-    if config.rival_radius == 0:
+    if config.hypothesis_radius == 0:
         return alone(source, target, T_target_source)
     if not config.ground_check:
         # what is up may be a wall here, and there the ceiling
         source, target = replace(source, level=False), replace(target, level=False)
-    found = hypothesis_test(source, target, T_target_source, hypotheses, config.rival_radius)
+    found = hypothesis_test(source, target, T_target_source, hypotheses, config.hypothesis_radius)
     if pose_score(found.outcomes).confidence >= config.min_confidence:
         return found
     T = icp(source, target, found.T_target_source[None], LATE, LATE)

@@ -53,7 +53,7 @@ class Alignment:
 
 def align(source: Surface, target: Surface, T_target_source: NDArray[np.float64],
           config: SgorConfig) -> Alignment:
-    """Refine a transformation by GICP, from within `local_reach`.
+    """Refine a transformation by GICP, from within `gicp_max_correspondence_distance`.
 
     As small_gicp does it, by Gauss-Newton and with normals in place of covariances.
     """
@@ -64,7 +64,7 @@ def align(source: Surface, target: Surface, T_target_source: NDArray[np.float64]
     for _ in range(ROUNDS):
         parallel_for(_sum_up, BLOCKS, here.points, source.normals, T, there.points,
                      target.normals, there.first, there.ny, there.low, there.edge,
-                     config.local_reach, sums)
+                     config.gicp_max_correspondence_distance, sums)
         total = sums.sum(axis=0)
         information = np.empty((6, 6))
         information[LOWER] = information.T[LOWER] = total[:21]
