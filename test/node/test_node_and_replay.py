@@ -73,7 +73,8 @@ def published(domain, recorded, folder, settings):
     with NodeProcess(domain, folder / 'log', *arguments) as node, ros.Partner(domain) as partner:
         partner.wait_for_node(node.alive)
         for topic, kind in KINDS.items():
-            partner.node.create_subscription(ros_type(kind), topic, raw[topic].append, 100, raw=True)
+            partner.node.create_subscription(ros_type(kind), topic, raw[topic].append, 100,
+                                             raw=True)
             partner.spin_until(lambda topic=topic: partner.node.count_publishers(topic))
         partner.spin_for(1.0)
         told = [partner.outcome_of(stamp_ns, cloud) for stamp_ns, cloud in recorded]
@@ -84,7 +85,7 @@ def published(domain, recorded, folder, settings):
 
 
 def canonical(raw, kind):
-    """Return a message serialised anew: what lies between its fields is nobody's choice."""
+    """Return a message serialised anew: only the padding between fields is free."""
     return bytes(STORE.serialize_cdr(STORE.deserialize_cdr(raw, kind), kind))
 
 
