@@ -8,6 +8,7 @@ from sensor_msgs.msg import PointCloud2
 
 from ..core.warmup import warm_up
 from ..io import messages
+from ..io.sequence import ScanSequence
 from ..io.sequence import StampedScan
 from ..pipeline import extrinsic
 from ..pipeline.pipeline import Pipeline
@@ -114,10 +115,7 @@ class SgorNode(Node):
             self._warm_up()
             self._compiled = True
             self._subscription = CloudSubscription(self, self._config.reliability, self._receive)
-            for scan in self._stream:
-                self._began_at = time.monotonic()
-                self._process(scan)
-                self._began_at = 0.0
+            self._process_all(self._stream)
         except Exception as error:
             self.crash = error
 
@@ -128,6 +126,12 @@ class SgorNode(Node):
             warm_up(self._settings.live[0])
         log.info(f'ready after {time.monotonic() - begin:.1f} s, waiting for clouds on '
                  f'{self._stream.name}')
+
+    def _process_all(self, scans: ScanSequence) -> None:
+        for scan in scans:
+            self._began_at = time.monotonic()
+            self._process(scan)
+            self._began_at = 0.0
 
     def _process(self, scan: StampedScan) -> None:
         """Apply what was asked for, run the pipeline, count and report what became of the scan."""

@@ -73,10 +73,7 @@ class BagSequence:
 
         The bag is read through for its stamps.
         """
-        truth = dict(self._bag.poses(TRUTH_TOPIC))
-        poses = [truth.get(scan.stamp_ns) for scan in self] if truth else [None]
-        known = [T for T in poses if T is not None]
-        return np.array(known) if 0 < len(known) == len(poses) else None
+        return _true_poses(self._bag, [scan.stamp_ns for scan in self])
 
 
 class _OpenBag:
@@ -141,8 +138,14 @@ def _drive(bag: _OpenBag, topic: str, name: str) -> Drive:
     scans = [DriveScan(f'{name}/{index:06d}', 'bag', SgorConfig().label_convention,
                        partial(bag.read, topic, *both)) for index, both in enumerate(times)]
     stamps = np.array([stamp_ns for _, stamp_ns in times], np.int64)
-    return Drive(name, scans, sequence.T_world_sensor,
+    return Drive(name, scans, _true_poses(bag.reader(), stamps.tolist()),
                  stamps_ns=stamps if (np.diff(stamps) > 0).all() else None)
+
+
+def _true_poses(bag: BagReader, stamps_ns: list[int]) -> NDArray[np.float64] | None:
+    truth = dict(bag.poses(TRUTH_TOPIC))
+    poses = [truth[stamp_ns] for stamp_ns in stamps_ns if stamp_ns in truth]
+    return np.array(poses) if 0 < len(poses) == len(stamps_ns) else None
 
 
 def _scan_of(cloud: RecordedCloud, label_field: str) -> StampedScan:
