@@ -72,7 +72,7 @@ def test_a_folder_and_a_bag_are_the_same_sequence(street, tmp_path, layout):
                 theirs.stamp_ns, theirs.frame_id, theirs.arrived_ns)
             np.testing.assert_array_equal(ours.read().points, theirs.read().points)
             np.testing.assert_array_equal(ours.read().labels, theirs.read().labels)
-    assert (sequence.label_convention, sequence.T_world_sensor) == (None, None)
+        assert (sequence.label_convention, sequence.T_world_sensor) == (None, None)
     raw = []
     for source in (folder, tmp_path / 'bag'):
         out = tmp_path / f'out of {source.name}'
