@@ -43,8 +43,8 @@ def check_prediction(source: PreparedScan, target: PreparedScan,
     Returns
     -------
     Registration
-        Its correspondences are keypoints that lie on each other. Without success it says nothing
-        but that this transformation is not confirmed: ask `register`.
+        Its correspondences are keypoints that lie on each other. Without success it tells
+        only that this transformation is not confirmed: ask `register`.
 
     Raises
     ------
@@ -80,7 +80,7 @@ def _compete(source: PreparedScan, target: PreparedScan, T_target_source: NDArra
 
 def _unconfirmed(pair: Pair, test: HypothesisTest, alignment: Alignment | None,
                  config: SgorConfig) -> str:
-    """Say why a pose is not confirmed before it is decided on; empty where it may be."""
+    """Return why a pose is not confirmed, before the verdict; empty where it may be."""
     score = pose_score(test.outcomes)
     if score.confidence < config.min_confidence:
         return low_confidence(score, config)

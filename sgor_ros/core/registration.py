@@ -52,7 +52,7 @@ class Attempt:
 
     @property
     def score(self) -> PoseScore:
-        """That of the pose; nothing speaks for one that is not there."""
+        """That of the pose; zero without one."""
         return PoseScore(0.0, 0.0) if self.test is None else pose_score(self.test.outcomes)
 
 
@@ -131,7 +131,7 @@ def _prepared(one: Scan, other: Scan, config: SgorConfig, clock: Stopwatch
 
 def _best_attempt(source: PreparedScan, target: PreparedScan, config: SgorConfig,
                   clock: Stopwatch) -> Attempt:
-    """Return the first attempt that the clouds believe; where they believe none, the best."""
+    """Return the first attempt above min_confidence; where there is none, the best."""
     labelled = all(scan.features.labelled_share > 0 for scan in (source, target))
     doubtful = source.scale < 1 and any(
         scan.ground is None or scan.ground.source == 'geometry' for scan in (source, target))

@@ -18,7 +18,7 @@ class TrackerAblation(Settings):
         'convince, and for each new keyframe. false: SGOR registers every scan')
     min_prediction_confidence: float = setting(
         0.85, 'A predicted motion is believed from this confidence on, or from min_confidence '
-        'where that is higher: who accepts any answer of SGOR would never hear of another one',
+        'where that is higher; below, SGOR registers the scan',
         minimum=0.0, maximum=1.0)
     keyframe_overlap: float = setting(
         0.6, 'A scan whose keypoints lie on surfaces of its keyframe less often than this share '

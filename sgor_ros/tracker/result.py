@@ -99,3 +99,10 @@ class TrackedScan:
     confirmed: bool = False
     keyframe_id: int | None = None
     reference_id: int | None = None
+
+
+def without_pose(stamp_ns: int, state: State, reason: str, track_id: int, failures: int, late: int,
+                 warnings: tuple[str, ...] = ()) -> TrackedScan:
+    """Return what became of a scan that was not worked on."""
+    return TrackedScan(stamp_ns, False, reason, None, None, None, None, None, False, False,
+                       warnings, {}, state, track_id, failures=failures, late=late)

@@ -1,5 +1,4 @@
 """The way of a scan through the tracker, on one screen."""
-from dataclasses import dataclass
 from dataclasses import replace
 import logging
 
@@ -10,7 +9,6 @@ from ..core.common import se3
 from ..core.common.settings import InputError
 from ..core.config import SgorConfig
 from ..core.prediction_check import check_prediction
-from ..core.prepared_scan import PreparedScan
 from ..core.preprocessing import preprocess
 from ..core.registration import register
 from ..core.scan.scan import SemanticScan
@@ -18,6 +16,7 @@ from ..core.verdict.result import Registration
 from .choice import choose
 from .choice import is_likely
 from .choice import refined
+from .choice import relocalised
 from .choice import Step
 from .choice import UNKNOWN_COVARIANCE
 from .config import TrackerConfig
@@ -30,30 +29,14 @@ from .keyframes import Keyframes
 from .motion import Motion
 from .result import State
 from .result import TrackedScan
+from .result import without_pose
+from .scan_at_work import ScanAtWork
 from .stamps import Arrival
 from .stamps import Stamps
 
 Array = NDArray[np.float64]
 
 LOGGER = logging.getLogger('sgor_ros')
-
-
-@dataclass(eq=False)
-class _Scan:
-    """The scan at work: what it has become so far."""
-
-    prepared: PreparedScan
-    stamp_ns: int
-    warnings: list[str]
-    timings: dict[str, float]
-    registration: Registration | None = None
-    reference: Keyframe | None = None
-    confirmed: bool = False
-
-    def spent(self, timings: dict[str, float]) -> None:
-        """Add the seconds of stages."""
-        for stage, seconds in timings.items():
-            self.timings[stage] = self.timings.get(stage, 0.0) + seconds
 
 
 class Tracker:
@@ -115,7 +98,8 @@ class Tracker:
         prepared = preprocess(
             scan, self.config,
             scale_before=self._reference.prepared.scale if self._reference else None)
-        new = _Scan(prepared, stamp_ns, [*warnings, *prepared.warnings], dict(prepared.timings))
+        new = ScanAtWork(prepared, stamp_ns, [*warnings, *prepared.warnings],
+                         dict(prepared.timings))
         if self._reference is None:
             return self._begin(new)
         step = self._predicted_step(new) or self._step(new, self._reference)
@@ -138,22 +122,21 @@ class Tracker:
 
     def _drop(self, stamp_ns: int) -> TrackedScan:
         self._late += 1
-        return TrackedScan(
-            stamp_ns, False, f'stamp {stamp_ns * 1e-9:.3f} s is not after the last, '
-            f'{(self._stamps.newest_ns or 0) * 1e-9:.3f} s', None, None, None, None, None, False,
-            False, (), {}, State.LATE, self._track_id, failures=self._failures, late=self._late)
+        return without_pose(
+            stamp_ns, State.LATE, f'stamp {stamp_ns * 1e-9:.3f} s is not after the last, '
+            f'{(self._stamps.newest_ns or 0) * 1e-9:.3f} s', self._track_id, self._failures,
+            self._late)
 
     def _fault(self, stamp_ns: int, warnings: list[str], error: Exception) -> TrackedScan:
         """Count a scan that an exception ended as one without a pose."""
         self._failures += 1
         lost = self._failures >= self.tracker_config.max_failures
-        return TrackedScan(
-            stamp_ns, False, f'fault of the program: {type(error).__name__}: {error}', None, None,
-            None, None, None, False, False, tuple(warnings), {},
-            State.LOST if lost else State.FAILED, self._track_id, failures=self._failures,
-            late=self._late)
+        return without_pose(
+            stamp_ns, State.LOST if lost else State.FAILED,
+            f'fault of the program: {type(error).__name__}: {error}', self._track_id,
+            self._failures, self._late, tuple(warnings))
 
-    def _begin(self, new: _Scan) -> TrackedScan:
+    def _begin(self, new: ScanAtWork) -> TrackedScan:
         """Make the scan the origin of a new track, if something can be registered to it."""
         keypoints = len(new.prepared.features.points)
         if keypoints < self.tracker_config.min_keypoints:
@@ -171,11 +154,12 @@ class Tracker:
         if c.predict_first and self.config.hypothesis_radius == 0:
             new.warnings.append('predict_first: SGOR registers every scan all the same, for '
                                 'hypothesis_radius is 0')
-        return replace(self._result(new, State.NEW_TRACK), success=True, T_odom_sensor=np.eye(4),
-                       covariance=origin.pose, keyframe=True, keyframe_id=self._reference.id,
-                       restarted=True)
+        return replace(
+            new.result(State.NEW_TRACK, self._track_id, self._failures, self._late), success=True,
+            T_odom_sensor=np.eye(4), covariance=origin.pose, keyframe=True,
+            keyframe_id=self._reference.id, restarted=True)
 
-    def _keyframe(self, new: _Scan, T_odom_sensor: Array, covariance: PoseCovariance | None
+    def _keyframe(self, new: ScanAtWork, T_odom_sensor: Array, covariance: PoseCovariance | None
                   ) -> Keyframe:
         """Make a scan one that others can be registered to."""
         self._ids += 1
@@ -185,13 +169,14 @@ class Tracker:
     def _last_keyframe(self) -> Keyframe | None:
         return self._keyframes.last(self._track_id)
 
-    def _predicted_step(self, new: _Scan) -> Step | None:
+    def _predicted_step(self, new: ScanAtWork) -> Step | None:
         """Test the predicted motion; return a step if it convinces, and None if SGOR is to run.
 
         That follows a scan that stood for itself, as long as no keyframe is to be made: what all
         later scans are registered to has been found without any prediction.
         """
-        c, motion = self.tracker_config, self._motion_before(new.stamp_ns)
+        c = self.tracker_config
+        motion = self._motion.before(new.stamp_ns, c)
         assert self._reference is not None
         prediction = motion.predict(new.stamp_ns, c)
         T = prediction.T_reference_sensor
@@ -224,44 +209,29 @@ class Tracker:
         return not (is_new_place(T_reference_sensor, self._reference, last, c)
                     or is_keyframe(T_reference_sensor, found, self._reference, last, c))
 
-    def _step(self, new: _Scan, keyframe: Keyframe) -> Step | str:
+    def _step(self, new: ScanAtWork, keyframe: Keyframe) -> Step | str:
         """Register a scan to a keyframe; return the step to it, or why there is none."""
         keyframe = keyframe.ready(self.config)
         found = register(new.prepared, keyframe.prepared, self.config)
         new.spent(found.timings)
         assert self._reference is not None
+        motion = self._motion.before(new.stamp_ns, self.tracker_config)
         if keyframe.id == self._reference.id:
             self._reference = keyframe
-            step = choose(found, self._motion_before(new.stamp_ns), new.stamp_ns,
-                          self.tracker_config, lambda placement: refined(
-                              placement, new.prepared, keyframe.prepared, self.config))
-        elif found.success and found.T_target_source is not None:
-            step = self._distant_step(found, keyframe, new.stamp_ns)
+            step = choose(found, motion, new.stamp_ns, self.tracker_config,
+                          lambda placement: refined(placement, new.prepared, keyframe.prepared,
+                                                    self.config))
         else:
-            step = found.reason
+            T_reference_keyframe = (
+                None if keyframe.track_id != self._track_id else
+                se3.inverse(self._reference.T_odom_sensor) @ keyframe.T_odom_sensor)
+            step = relocalised(found, T_reference_keyframe, motion, new.stamp_ns,
+                               self.tracker_config)
         if new.registration is None or not isinstance(step, str):
             new.registration, new.reference = found, keyframe
         return step
 
-    def _distant_step(self, found: Registration, keyframe: Keyframe, stamp_ns: int
-                      ) -> Step | str:
-        """Return a step to a keyframe that is not the reference, if the sensor can be there."""
-        assert self._reference is not None
-        assert found.T_target_source is not None
-        step = Step(found.T_target_source, found.covariance, found.correlated_error)
-        if keyframe.track_id != self._track_id:
-            return step
-        T = (se3.inverse(self._reference.T_odom_sensor) @ keyframe.T_odom_sensor
-             @ found.T_target_source)
-        return self._motion_before(stamp_ns).impossible(stamp_ns, T, self.tracker_config) or step
-
-    def _motion_before(self, stamp_ns: int) -> Motion:
-        """Return the last motion; where its stamp lay in the future, the place alone."""
-        motion = self._motion
-        return motion if motion.stamp_ns < stamp_ns else Motion.unknown(
-            stamp_ns - 1, motion.T_reference_sensor, motion.pose_covariance, self.tracker_config)
-
-    def _relocalise(self, new: _Scan, tries: int, *, earlier: bool = False) -> Step | None:
+    def _relocalise(self, new: ScanAtWork, tries: int, *, earlier: bool = False) -> Step | None:
         """Try other keyframes, or those of earlier tracks; each scan a few, in turns."""
         assert self._reference is not None
         for keyframe in self._keyframes.in_turns(tries, self._reference,
@@ -270,7 +240,7 @@ class Tracker:
                 return step
         return None
 
-    def _accept(self, new: _Scan, step: Step) -> TrackedScan:
+    def _accept(self, new: ScanAtWork, step: Step) -> TrackedScan:
         """Give a registered scan its pose, and decide what the next is registered to."""
         keyframe, T = new.reference, step.T_reference_sensor
         assert keyframe is not None
@@ -287,9 +257,10 @@ class Tracker:
         if keyframe.covariance is not None and step.covariance is not None:
             covariance = keyframe.covariance.then(keyframe.T_odom_sensor, T, step.covariance,
                                                   step.correlated_error)
+        state = State.TRACKING if step.fused is None else State.DEGENERATE
         result = replace(
-            self._result(new, State.TRACKING if step.fused is None else State.DEGENERATE),
-            success=True, T_odom_sensor=T_odom_sensor,
+            new.result(state, self._track_id, self._failures, self._late), success=True,
+            T_odom_sensor=T_odom_sensor,
             covariance=None if covariance is None else covariance.pose,
             twist=self._motion.twist if moving else None,
             twist_covariance=(self._motion.twist_covariance
@@ -308,7 +279,7 @@ class Tracker:
             self._keyframes.add(self._reference, self.tracker_config.max_keyframes)
         return replace(result, keyframe=True, keyframe_id=self._reference.id)
 
-    def _move(self, new: _Scan, keyframe: Keyframe, step: Step) -> bool:
+    def _move(self, new: ScanAtWork, keyframe: Keyframe, step: Step) -> bool:
         """Take in the motion of a step; return whether the velocity is known."""
         assert self._reference is not None
         covariance = UNKNOWN_COVARIANCE if step.covariance is None else step.covariance
@@ -324,7 +295,7 @@ class Tracker:
             return False
         return True
 
-    def _fail(self, new: _Scan, reason: str) -> TrackedScan:
+    def _fail(self, new: ScanAtWork, reason: str) -> TrackedScan:
         """Give no pose; the keyframes stay, until after long a new track begins."""
         config = self.tracker_config
         self._failures += 1
@@ -337,13 +308,5 @@ class Tracker:
             return self._begin(new)
         if self._failures == config.max_failures:
             new.warnings.append(f'{self._failures} scans in a row without a pose: lost')
-        return replace(self._result(new, State.LOST if lost else State.FAILED), reason=reason)
-
-    def _result(self, new: _Scan, state: State) -> TrackedScan:
-        """Return what is known of a scan before it has a pose."""
-        return TrackedScan(
-            new.stamp_ns, False, '', None, None, None, new.registration,
-            None if new.reference is None else new.reference.stamp_ns, False, False,
-            tuple(new.warnings), new.timings, state, self._track_id, failures=self._failures,
-            late=self._late, confirmed=new.confirmed,
-            reference_id=None if new.reference is None else new.reference.id)
+        return replace(new.result(State.LOST if lost else State.FAILED, self._track_id,
+                                  self._failures, self._late), reason=reason)

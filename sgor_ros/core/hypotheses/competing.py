@@ -7,7 +7,8 @@ among the hypotheses of the solver, and step by step along weak directions. Each
 and scored at the same keypoints.
 
 A competing pose is ruled out by free space: where it lays points into what the other sensor has
-looked through, and the answer does not. What every pose explains, walls and road, says nothing.
+looked through, and the answer does not. What every pose explains, walls and road, tells none
+apart.
 """
 from dataclasses import dataclass
 from dataclasses import replace
