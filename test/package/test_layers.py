@@ -9,7 +9,7 @@ import pytest
 import sgor_ros
 
 PACKAGE = Path(sgor_ros.__file__).parent
-SHELLS = {'io', 'visualize', 'ros', 'commands', 'evaluation'}
+SHELLS = {'io', 'pipeline', 'visualize', 'ros', 'commands', 'evaluation'}
 ROS = {'rclpy', 'ament_index_python', 'launch', 'launch_ros', 'sensor_msgs', 'nav_msgs',
        'geometry_msgs', 'visualization_msgs', 'diagnostic_msgs', 'std_msgs', 'std_srvs',
        'builtin_interfaces', 'rcl_interfaces', 'tf2_msgs', 'tf2_ros'}
@@ -23,9 +23,10 @@ MAY_IMPORT = {
     'api': {'core', 'tracker'},
     'io': {'core', 'tracker'},
     'evaluation': {'core', 'tracker', 'io'},
-    'ros': {'core', 'tracker', 'io'},
+    'pipeline': {'core', 'tracker', 'io'},
+    'ros': {'core', 'tracker', 'io', 'pipeline'},
     'visualize': {'core', 'tracker'},
-    'commands': {'core', 'tracker', 'io', 'evaluation', 'ros', 'visualize', 'world'},
+    'commands': {'core', 'tracker', 'io', 'pipeline', 'evaluation', 'ros', 'visualize', 'world'},
     'world': set(),
 }
 
