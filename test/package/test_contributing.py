@@ -60,7 +60,7 @@ def test_a_data_set_is_recognised_and_read(copy, street, tmp_path):
     write_kitti(tmp_path / 'poses.txt', [T for *_, T in street])
     told = run(copy, '-c', 'import sys; from sgor_ros import open_drive\n'
                'drive = open_drive(sys.argv[1]); scan = drive.read(1)\n'
-               'print(len(drive), drive.frames[1].data_set, len(scan.points),\n'
+               'print(len(drive), drive.scans[1].data_set, len(scan.points),\n'
                '      int(scan.labels.sum()), float(drive.T_world_sensor[1, 0, 3]))',
                str(tmp_path))
     points, labels, T = street[1]
