@@ -34,9 +34,9 @@ from ..evaluation.protocols.posed import strided
 from ..evaluation.protocols.protocol import Protocol
 from ..evaluation.report import protocol_page
 from ..io.datasets import Drive
-from ..io.datasets import Frame
+from ..io.datasets import DriveScan
 from ..io.datasets import open_drives
-from . import frame
+from . import command_line
 from .benchmarks import inputs
 
 SPEED_M_S = 8.0
@@ -45,11 +45,11 @@ ABLATION = 'ablation'
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command and return its exit code."""
-    return frame.run(_tables, _parser().parse_args(arguments))
+    return command_line.run(_tables, _parser().parse_args(arguments))
 
 
-def _parser() -> frame.Parser:
-    parser = frame.Parser(
+def _parser() -> command_line.Parser:
+    parser = command_line.Parser(
         'sgor_tables', 'PROTOCOL [options]',
         'Run a protocol of the literature with every method on the same matches, and print its '
         'table beside the published rows. Stopped, it goes on where it was when it is started '
@@ -117,7 +117,7 @@ def _tables(arguments: Namespace) -> int:
                   variants=studies.variants(study, arguments.values, arguments.seed),
                   processes=arguments.processes, dask=arguments.dask)
     print(protocol_page.write(output, rows, protocol, methods, study, features))
-    return frame.OK
+    return command_line.OK
 
 
 def _methods(arguments: Namespace, protocol: Protocol) -> list[Method]:
@@ -178,12 +178,12 @@ def _kitti_loops(arguments: Namespace) -> Protocol:
     return kitti_loops(arguments.list, _finder(arguments))
 
 
-def _finder(arguments: Namespace) -> Callable[[int, int], Frame | None]:
+def _finder(arguments: Namespace) -> Callable[[int, int], DriveScan | None]:
     """Return what finds scan i of a sequence: in a folder of its number."""
     if arguments.data is None:
         raise InputError('--list needs --data: the folder of the sequences')
-    drives = {d.name.rpartition('/')[2]: {frame.name.rpartition('/')[2]: frame
-                                          for frame in d.frames}
+    drives = {d.name.rpartition('/')[2]: {scan.name.rpartition('/')[2]: scan
+                                          for scan in d.scans}
               for d in open_drives(arguments.data)}
     return lambda sequence, scan: drives.get(f'{sequence:02d}', {}).get(f'{scan:06d}')
 

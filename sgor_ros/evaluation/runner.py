@@ -153,7 +153,8 @@ def run(protocol: Protocol, methods: Sequence[Method], folder: Path | None = Non
     Returns
     -------
     list of Row
-        In the order of variants, pairs and methods, whatever order they were done in.
+        In the order of variants, pairs and methods, whatever order they were done in; with a
+        folder, what ``pairs.csv`` holds of them.
 
     Raises
     ------
@@ -183,6 +184,9 @@ def run(protocol: Protocol, methods: Sequence[Method], folder: Path | None = Non
             if file is not None:
                 file.write(table.lines(row for rows in found for row in rows))
                 file.flush()
+    if folder is not None:
+        # the same, whether a run was resumed or not
+        done = _by_key(table.read(folder / 'pairs.csv'), protocol)
     return [row for variant in variants for index in range(len(protocol.pairs))
             for method in methods for row in done[variant.name, index, method.name]]
 
@@ -199,6 +203,10 @@ def _resumed(folder: Path, protocol: Protocol, features: Features | None) -> dic
     rows = table.read(path)
     # what was cut off in the middle of a line goes
     path.write_text(table.TABLES_HEADER + table.lines(rows))
+    return _by_key(rows, protocol)
+
+
+def _by_key(rows: Iterable[Row], protocol: Protocol) -> dict[Key, list[Row]]:
     index = {pair.name: number for number, pair in enumerate(protocol.pairs)}
     return {(row.variant, index[row.pair], row.method): [row] for row in rows
             if row.pair in index}

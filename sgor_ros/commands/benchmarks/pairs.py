@@ -51,7 +51,8 @@ def measure(arguments: Namespace, folder: Path) -> None:
     text = '\n\n'.join((
         pair_tables.pairs_table(rows, names, memory), pair_tables.data_sets_table(rows, names),
         pair_tables.RULE + ' Peak memory: of a process of its own for each method, its libraries '
-        f'included; {memory[""]:.0f} MB of it are Python with numpy, scipy, numba and the two scans.'))
+        f'included; {memory[""]:.0f} MB of it are Python with numpy, scipy, numba and the two '
+        'scans.'))
     inputs.finish(arguments, folder, text, records(rows), len(right), len(wrong))
     plots.plot_pairs(folder / 'plot.png', rows, names)
 

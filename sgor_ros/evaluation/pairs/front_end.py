@@ -19,7 +19,7 @@ from ...core.preprocessing import preprocess
 from ...core.scan.labels import label_convention
 from ...core.scan.labels import UNLABELLED
 from ...core.scan.scan import SemanticScan
-from ...io.datasets import Frame
+from ...io.datasets import DriveScan
 from .pair import Matches
 from .pair import Pair
 from .pair import Scans
@@ -64,9 +64,9 @@ class Features:
 
     folder: Path
 
-    def read(self, frame: Frame) -> tuple[NDArray[np.float64], NDArray[np.float32]]:
+    def read(self, scan: DriveScan) -> tuple[NDArray[np.float64], NDArray[np.float32]]:
         """Return the keypoints and descriptors of a scan."""
-        path = self.folder / f'{frame.name}.npz'
+        path = self.folder / f'{scan.name}.npz'
         try:
             with np.load(path) as file:
                 return file['points'].astype(np.float64), file['descriptors'].astype(np.float32)
@@ -80,7 +80,7 @@ def scans_of(pair: Pair, seed: int | None) -> tuple[Scans, Array | None]:
 
     With a seed the source is turned: by a uniform yaw, a roll and pitch of 2 degrees (normal).
     """
-    source, target = (frame.read() for frame in pair.frames)
+    source, target = (scan.read() for scan in pair.scans)
     truth = pair.T_target_source
     if seed is not None:
         rng = np.random.default_rng(seed)
@@ -89,7 +89,7 @@ def scans_of(pair: Pair, seed: int | None) -> tuple[Scans, Array | None]:
         turned = se3.transform(T_turned_source, source.points.astype(np.float64))
         source = SemanticScan(turned.astype(np.float32), source.labels)
         truth = None if truth is None else truth @ se3.inverse(T_turned_source)
-    of_source, of_target = (frame.label_convention for frame in pair.frames)
+    of_source, of_target = (scan.label_convention for scan in pair.scans)
     return Scans(source, target, of_source, of_target, seed or 0), truth
 
 
@@ -100,8 +100,8 @@ def shared_matches(pair: Pair, config: SgorConfig, inlier_m: float, variant: Var
     if pair.matches is not None:
         found = _thinned(pair.matches.correspondences, variant.matches, rng)
         return replace(pair.matches, correspondences=found)
-    source, target = (_prepared(frame, config, variant, rng, features)
-                      for frame in pair.frames)
+    source, target = (_prepared(scan, config, variant, rng, features)
+                      for scan in pair.scans)
     p, q = source.features, target.features
     if config.correspondence_preprocessing and config.semantics != 'none':
         p, q = overlap_region(p, q)
@@ -111,18 +111,18 @@ def shared_matches(pair: Pair, config: SgorConfig, inlier_m: float, variant: Var
     return Matches(found, inlier_m, normals)
 
 
-def _prepared(frame: Frame, config: SgorConfig, variant: Variant, rng: np.random.Generator,
-              features: Features | None) -> PreparedScan:
-    scan = frame.read()
+def _prepared(drive_scan: DriveScan, config: SgorConfig, variant: Variant,
+              rng: np.random.Generator, features: Features | None) -> PreparedScan:
+    scan = drive_scan.read()
     labels = scan.labels
     if labels is not None:
         if variant.random_labels:
             labels = random_labels(labels, variant.random_labels, rng)
         if variant.categories:
-            labels = with_categories(labels, frame.label_convention, variant.categories)
-    keypoints, descriptors = (None, None) if features is None else features.read(frame)
+            labels = with_categories(labels, drive_scan.label_convention, variant.categories)
+    keypoints, descriptors = (None, None) if features is None else features.read(drive_scan)
     return preprocess(SemanticScan(scan.points, labels),
-                      config.replace(label_convention=frame.label_convention),
+                      config.replace(label_convention=drive_scan.label_convention),
                       keypoints=keypoints, descriptors=descriptors)
 
 

@@ -10,7 +10,7 @@ from ...core.config import SgorConfig
 from ...core.matching.correspondences import Correspondences
 from ...core.matching.correspondences import given_correspondences
 from ...core.scan.scan import SemanticScan
-from ...io.datasets import Frame
+from ...io.datasets import DriveScan
 
 Array = NDArray[np.float64]
 
@@ -78,7 +78,7 @@ class Pair:
 
     Attributes
     ----------
-    source, target : Frame or None
+    source, target : DriveScan or None
         None where there are matches in place of scans.
     T_target_source : (4, 4) float64 or None
         The truth; None where the scans are of different drives.
@@ -93,8 +93,8 @@ class Pair:
     matches : Matches or None
     """
 
-    source: Frame | None
-    target: Frame | None
+    source: DriveScan | None
+    target: DriveScan | None
     T_target_source: Array | None
     same_place: bool = True
     heights_known: bool = True
@@ -110,7 +110,7 @@ class Pair:
                 sorted({self.source.data_set, self.target.data_set})))
 
     @property
-    def frames(self) -> tuple[Frame, Frame]:
+    def scans(self) -> tuple[DriveScan, DriveScan]:
         """Source and target of a pair that has scans."""
         assert self.source is not None
         assert self.target is not None

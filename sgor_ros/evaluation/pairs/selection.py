@@ -16,7 +16,7 @@ from ...core.common import se3
 from ...core.common.settings import InputError
 from ...core.scan.scan import SemanticScan
 from ...io.datasets import Drive
-from ...io.datasets import Frame
+from ...io.datasets import DriveScan
 from ...io.datasets.semantickitti import frame
 from .pair import Pair
 
@@ -28,20 +28,20 @@ NO_OVERLAP_M = 100.0
 BAND_M = 10.0
 
 
-def frame_in_memory(name: str, data_set: str, points: NDArray[np.float32],
-                    labels: NDArray[np.uint32]) -> Frame:
+def scan_in_memory(name: str, data_set: str, points: NDArray[np.float32],
+                    labels: NDArray[np.uint32]) -> DriveScan:
     """Describe a scan in memory: points (N, 3), raw SemanticKITTI labels (N,)."""
-    return Frame(name, data_set, 'semantickitti', partial(SemanticScan, points, labels))
+    return DriveScan(name, data_set, 'semantickitti', partial(SemanticScan, points, labels))
 
 
 def drive_of(name: str, scans: Iterable[tuple[NDArray[np.float32], NDArray[np.uint32], Array]]
              ) -> Drive:
     """Make a drive of scans in memory: points, raw SemanticKITTI labels, T_world_sensor."""
-    frames, poses = [], []
+    named, poses = [], []
     for index, (points, labels, T_world_sensor) in enumerate(scans):
-        frames.append(frame_in_memory(f'{name}/{index:06d}', 'street', points, labels))
+        named.append(scan_in_memory(f'{name}/{index:06d}', 'street', points, labels))
         poses.append(T_world_sensor)
-    return Drive(name, frames, np.array(poses))
+    return Drive(name, named, np.array(poses))
 
 
 def near_pairs(drives: Sequence[Drive], max_distance_m: float) -> list[Pair]:
@@ -50,9 +50,9 @@ def near_pairs(drives: Sequence[Drive], max_distance_m: float) -> list[Pair]:
     for drive in drives:
         if drive.T_world_sensor is None:
             continue
-        T = drive.T_world_sensor[:len(drive.frames)]
+        T = drive.T_world_sensor[:len(drive.scans)]
         for i, j in sorted(cKDTree(T[:, :3, 3]).query_pairs(max_distance_m)):
-            pairs.append(Pair(drive.frames[j], drive.frames[i], se3.inverse(T[i]) @ T[j],
+            pairs.append(Pair(drive.scans[j], drive.scans[i], se3.inverse(T[i]) @ T[j],
                               heights_known=drive.heights_known))
     return pairs
 
@@ -97,7 +97,7 @@ def different_places(drives: Sequence[Drive], count: int, seed: int) -> list[Pai
 
     Scans of one drive count as different places where they are over `NO_OVERLAP_M` apart.
     """
-    kinds = [[Pair(a, b, None, same_place=False) for a in one.frames for b in other.frames]
+    kinds = [[Pair(a, b, None, same_place=False) for a in one.scans for b in other.scans]
              for one, other in combinations(drives, 2)]
     kinds += [far for drive in drives if (far := list(_far_pairs(drive)))]
     return _in_turns(kinds, count, seed)
@@ -115,7 +115,7 @@ def _far_pairs(drive: Drive) -> Iterator[Pair]:
     if drive.T_world_sensor is None:
         return
     T = drive.T_world_sensor
-    for i, j in combinations(range(len(drive.frames)), 2):
+    for i, j in combinations(range(len(drive.scans)), 2):
         if np.linalg.norm(T[i, :3, 3] - T[j, :3, 3]) > NO_OVERLAP_M:
-            yield Pair(drive.frames[j], drive.frames[i], se3.inverse(T[i]) @ T[j],
+            yield Pair(drive.scans[j], drive.scans[i], se3.inverse(T[i]) @ T[j],
                        same_place=False, heights_known=drive.heights_known)

@@ -52,8 +52,8 @@ def _icp(pair: Pair) -> Array:
     registration = o3d.pipelines.registration
     assert pair.T_target_source is not None
     source, target = (o3d.geometry.PointCloud(o3d.utility.Vector3dVector(
-        frame.read().points.astype(np.float64))).voxel_down_sample(VOXEL_M)
-        for frame in pair.frames)
+        scan.read().points.astype(np.float64))).voxel_down_sample(VOXEL_M)
+        for scan in pair.scans)
     source.transform(pair.T_target_source)
     found = registration.registration_icp(
         source, target, REACH_M, np.eye(4),

@@ -7,10 +7,10 @@ from numpy.typing import NDArray
 from ...core.common import se3
 from ...core.common.settings import InputError
 from ...io.datasets import Drive
-from ...io.datasets import Frame
+from ...io.datasets import DriveScan
 from ..pairs.pair import Pair
 from ..pairs.selection import drive_of
-from ..pairs.selection import frame_in_memory
+from ..pairs.selection import scan_in_memory
 
 
 def scene_kinds(names: Sequence[str]) -> dict[str, bool]:
@@ -54,13 +54,13 @@ def scene_pairs(kind: str, count: int, seed: int) -> list[Pair]:
     rng = np.random.default_rng([seed, list(scenes.KINDS).index(kind)])
     lidar = Lidar()
     same: list[Pair] = []
-    targets: list[Frame] = []
+    targets: list[DriveScan] = []
     for index in range(count + 1):
         place = scenes.make(kind, 1000 * seed + index)
 
         def scan(pose: NDArray[np.float64], role: str, place: scenes.Place = place,
-                 index: int = index) -> Frame:
-            return frame_in_memory(f'{kind}/{index:03d}/{role}', kind,
+                 index: int = index) -> DriveScan:
+            return scan_in_memory(f'{kind}/{index:03d}/{role}', kind,
                                    *lidar.scan(place, pose, rng))
 
         T_world_target, T_world_source = scenes.random_pair(place, rng,

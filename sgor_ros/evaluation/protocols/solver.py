@@ -67,8 +67,8 @@ def fpfh_matches(pairs: Sequence[Pair], count: int) -> Iterator[Pair]:
     config = SgorConfig.paper().replace(voxel_size=FINE_VOXEL_M, semantics='none',
                                         max_correspondences=count)
     for pair in progress(pairs, 'matching'):
-        source, target = (preprocess(SemanticScan(frame.read().points), config).features
-                          for frame in pair.frames)
+        source, target = (preprocess(SemanticScan(scan.read().points), config).features
+                          for scan in pair.scans)
         found = match(source, target, config)
         yield Pair(None, None, pair.T_target_source, name=f'{pair.group}, {pair.distance_m:.0f} m',
                    matches=Matches.of(found.source, found.target, INLIER_M))
