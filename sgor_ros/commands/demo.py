@@ -15,6 +15,7 @@ from tqdm import tqdm
 
 from ..core.common.settings import InputError
 from ..core.config import SgorConfig
+from ..evaluation.extra import require_evaluation
 from ..evaluation.metrics.trajectory import trajectory_errors
 from ..evaluation.metrics.trajectory import TrajectoryErrors
 from ..evaluation.report.trajectory_plots import plot_against_truth
@@ -56,6 +57,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 def play(options: argparse.Namespace) -> int:
     """Run the demo; 1 where the node did badly."""
+    require_evaluation()
     try:
         return _run(options)
     except TimeoutError as error:

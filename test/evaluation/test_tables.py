@@ -2,7 +2,6 @@
 from dataclasses import replace
 import itertools
 import multiprocessing
-from pathlib import Path
 import signal
 import subprocess
 import sys
@@ -41,9 +40,6 @@ from sgor_ros.evaluation.report.protocol_tables import whole
 from sgor_ros.evaluation.runner import run
 from sgor_ros.world import Lidar
 from sgor_ros.world import simulate
-
-DATA = Path(__file__).resolve().parents[3] / 'shared/data'
-needs_data = pytest.mark.skipif(not DATA.is_dir(), reason='no shared data')
 
 
 @pytest.fixture(scope='module')
@@ -86,9 +82,8 @@ def test_ten_metre_rule_by_hand():
     assert ten_metre_pairs(standing)[0] == (55, 153)
 
 
-@needs_data
-def test_lists_and_rule_of_kitti():
-    lists = DATA / 'pair_lists'
+def test_lists_and_rule_of_kitti(data_folder):
+    lists = data_folder / 'pair_lists'
     rows = read_pair_list(lists / 'kitti_10m.txt')
     assert len(rows) == 556
     assert [sum(row[0] == s for row in rows) for s in (8, 9, 10)] == [307, 162, 87]
@@ -102,10 +97,9 @@ def test_lists_and_rule_of_kitti():
     assert sizes == [914, 1151, 1260]
 
 
-@needs_data
-def test_listed_truth_maps_source_into_target():
+def test_listed_truth_maps_source_into_target(data_folder):
     """Of the first row of the loops whose scans would be here, by the poses of the sequence."""
-    path = DATA / 'pair_lists/kitti_loops_0_10.txt'
+    path = data_folder / 'pair_lists/kitti_loops_0_10.txt'
     for _, _, _, _, T in read_pair_list(path)[:50]:
         assert np.linalg.norm(T[:3, 3]) < 10.5
         assert np.linalg.det(T[:3, :3]) == pytest.approx(1, abs=1e-3)
@@ -276,11 +270,10 @@ def test_depth_map_by_hand(tmp_path):
     assert scan.labels.tolist() == [9, 9]
 
 
-@needs_data
 @pytest.mark.parametrize(('names', 'inlier', 'count'), [('kitti_*', 0.6, 3), ('3d*', 0.1, 1)])
-def test_matches_from_files(tmp_path, names, inlier, count):
+def test_matches_from_files(tmp_path, names, inlier, count, data_folder):
     """The shared sets, thinned by a study too."""
-    protocol = given_matches(DATA / 'correspondences', names, inlier)
+    protocol = given_matches(data_folder / 'correspondences', names, inlier)
     found = run(protocol, [Method('m', centroid)], tmp_path,
                 variants=[front_end.Variant('all'), front_end.Variant('9', matches=9)])
     assert len(found) == 2 * count
@@ -288,11 +281,10 @@ def test_matches_from_files(tmp_path, names, inlier, count):
     assert {r.matches for r in found[count:]} == {9}
 
 
-@needs_data
-def test_3dmatch_runs_to_its_end(tmp_path):
+def test_3dmatch_runs_to_its_end(tmp_path, data_folder):
     """The pair that is here, with the truth of its log, by SC2-PCR."""
     from sgor_ros.evaluation.methods.sc2_pcr import sc2_pcr
-    protocol = threedmatch(DATA / 'indoor')
+    protocol = threedmatch(data_folder / 'indoor')
     pair, = protocol.pairs
     assert (pair.name, pair.group) == ('7-scenes-redkitchen 4 0', '7-scenes-redkitchen')
     assert protocol.missing > 100
@@ -300,11 +292,10 @@ def test_3dmatch_runs_to_its_end(tmp_path):
     assert found.within(protocol.thresholds[0])
 
 
-@needs_data
-def test_refined_truth_is_kept(tmp_path):
+def test_refined_truth_is_kept(tmp_path, data_folder):
     """ICP of real scans from poses that are 5 cm off; the second time nothing is read."""
     from sgor_ros.io.datasets import open_drives
-    drive, = open_drives(DATA / 'kitti/08')
+    drive, = open_drives(data_folder / 'kitti/08')
     T = drive.T_world_sensor
     pair = strided([replace(drive, T_world_sensor=T[:len(drive.scans)])], [3]).pairs[0]
     off = replace(pair, T_target_source=se3.compose(np.eye(3), np.array([0.05, 0.05, 0.0]))

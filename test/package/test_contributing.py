@@ -90,8 +90,10 @@ print(source.features.descriptors.shape[1], found.status,
 def test_a_method_is_among_the_rivals(copy):
     told = run(copy, '-c', """
 import numpy as np
-from sgor_ros.evaluation.methods import Matches, rivals
+from sgor_ros.evaluation.methods import imported, Matches, rivals_on_matches
 points = np.random.default_rng(0).uniform(-9, 9, (50, 3))
-method = rivals(lambda text: None)['median shift']
-print(*method(Matches.of(points, points + (1, 2, 3), 0.6)).T_target_source[:3, 3].round(6))""")
-    assert [float(each) for each in told.split()] == [1, 2, 3]
+matches = Matches.of(points, points + (1, 2, 3), 0.6)
+for method in (rivals_on_matches(lambda text: None)['median shift'],
+               imported('sgor_ros.evaluation.methods.median_shift:median_shift')):
+    print(*method.run(matches).T_target_source[:3, 3].round(6))""")
+    assert [float(each) for each in told.split()] == 2 * [1, 2, 3]

@@ -61,7 +61,9 @@ def rivals_on_scans(say: Callable[[str], None]) -> dict[str, Method]:
 
 
 def imported(name: str) -> Method:
-    """Return a method on matches from a file of the user's, ``MODULE:FUNCTION``.
+    """Return a method from a file of the user's, ``MODULE:FUNCTION``.
+
+    The function takes matches; in its place may be a `Method`, of raw scans too.
 
     Raises
     ------
@@ -71,9 +73,10 @@ def imported(name: str) -> Method:
     module, _, function = name.partition(':')
     sys.path.insert(0, '')
     try:
-        return Method(name, getattr(import_module(module), function))
+        found = getattr(import_module(module), function)
     except (ImportError, AttributeError, ValueError) as error:
         raise InputError(f'--method {name}: expected MODULE:FUNCTION: {error}') from error
+    return found if isinstance(found, Method) else Method(name, found)
 
 
 def _function(path: str) -> Any:
