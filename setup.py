@@ -10,16 +10,7 @@ HERE = Path(__file__).resolve().parent
 PACKAGE = ElementTree.parse(HERE / 'package.xml').getroot()
 MAINTAINER = PACKAGE.find('maintainer')
 SHARE = 'share/sgor_ros'
-COMMANDS = {
-    'sgor_node': 'sgor_ros.ros.node',
-    'sgor_replay': 'sgor_ros.commands.replay',
-    'sgor_register': 'sgor_ros.commands.register',
-    'sgor_kitti_to_bag': 'sgor_ros.commands.kitti_to_bag',
-    'sgor_benchmark': 'sgor_ros.commands.benchmark',
-    'sgor_demo': 'sgor_ros.commands.demo',
-    'sgor_warm_up': 'sgor_ros.commands.warm_up',
-    'sgor_tables': 'sgor_ros.commands.tables',
-}
+COMMANDS = ('replay', 'register', 'kitti_to_bag', 'benchmark', 'demo', 'warm_up', 'tables')
 # the built-in world; the module of open3d without CUDA
 OPEN3D = ['open3d-cpu>=0.18']
 
@@ -93,6 +84,8 @@ setup(
         ],
     },
     entry_points={
-        'console_scripts': [f'{name} = {module}:main' for name, module in COMMANDS.items()],
+        'console_scripts': [
+            'sgor_node = sgor_ros.ros.node:main',
+            *(f'sgor_{name} = sgor_ros.commands.entry:{name}' for name in COMMANDS)],
     },
 )

@@ -3,4 +3,3 @@
 `registration` is the method on one screen. The rooms: `scan` describes one scan, `matching` pairs
 two, `solver` is the paper's Sec. III, `trust` judges, `common` is what all of them use.
 """
-from .execution import threads as threads  # first: it says where numba keeps its code

@@ -17,7 +17,6 @@ FILES = {'rosbags', 'rerun', 'matplotlib', 'tqdm', 'argparse'}
 
 # module or folder -> what it may import of the package besides itself
 MAY_IMPORT = {
-    'cache': set(),
     'core': set(),
     'tracker': {'core'},
     'api': {'core', 'tracker'},
