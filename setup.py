@@ -39,28 +39,28 @@ setup(
     ],
     python_requires='>=3.12',
     packages=find_packages(include=['sgor_ros', 'sgor_ros.*']),
-    package_data={'sgor_ros': ['py.typed']},
+    package_data={'sgor_ros': ['py.typed', 'core/scan/conventions/*.toml']},
     data_files=[
         ('share/ament_index/resource_index/packages', ['resource/sgor_ros']),
         (SHARE, ['package.xml']),
         (f'{SHARE}/config', glob('config/*.yaml') + glob('config/*.rviz')
          + glob('config/*.json')),
-        (f'{SHARE}/config/labels', glob('config/labels/*.yaml')),
         (f'{SHARE}/launch', glob('launch/*.py')),
     ],
     zip_safe=False,
     install_requires=[
-        'setuptools',
-        'matplotlib',
         'numba>=0.58',
         'numpy>=1.26',
-        'pyyaml',
-        'rosbags~=0.11.0',    # its 0.x releases remove names
         'scipy>=1.11',
-        'threadpoolctl>=3.0',
-        'tqdm',
     ],
     extras_require={
+        # files, bags and pictures: what the commands need beside the library
+        'commands': [
+            'matplotlib',
+            'pyyaml',
+            'rosbags~=0.11.0',    # its 0.x releases remove names
+            'tqdm',
+        ],
         # where no ROS 2 Jazzy is installed: the same rclpy with Fast DDS, as wheels
         'ros': ['ros-jazzy-rclpy[fastrtps]', 'ros-jazzy-common-interfaces'],
         'open3d': OPEN3D,

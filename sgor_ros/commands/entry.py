@@ -9,10 +9,8 @@ import sys
 from ..core.execution.cache import choose_cache_folder
 from .frame import REFUSED
 
-EXTRAS = {'commands': ('matplotlib', 'rosbags', 'tqdm', 'yaml'),
-          'open3d': ('open3d',),
-          'benchmark': ('igraph', 'PIL')}
-"""What ``pip install`` calls the packages that commands import and the library does not."""
+EXTRA = ('matplotlib', 'rosbags', 'tqdm', 'yaml')
+"""What commands import and the library does not: the extra ``commands``."""
 
 
 def _entry(module: str) -> Callable[[], int]:
@@ -22,11 +20,10 @@ def _entry(module: str) -> Callable[[], int]:
             command = import_module(f'{__package__}.{module}')
         except ModuleNotFoundError as error:
             missing = (error.name or '').partition('.')[0]
-            extra = next((extra for extra, names in EXTRAS.items() if missing in names), None)
-            if extra is None:
+            if missing not in EXTRA:
                 raise
-            print(f'error: sgor_{module} needs {missing}, which is not installed: '
-                  f"pip install 'sgor_ros[{extra}]'", file=sys.stderr)
+            print(f"error: sgor_{module} needs {missing}: pip install 'sgor_ros[commands]', in a "
+                  "checkout '.[commands]'", file=sys.stderr)
             return REFUSED
         code: int = command.main()
         return code

@@ -123,6 +123,8 @@ DOORS = {
                 partial(seeds.made_npz, mutated)),
     'pcd': Door('a.pcd', seeds.pcds, lambda path: _scan(read_scan(path))),
     'ply': Door('a.ply', seeds.plys, lambda path: _scan(read_scan(path))),
+    'label_toml': Door('a.toml', seeds.label_tomls, _label_table),
+    'label_json': Door('a.json', seeds.label_jsons, _label_table),
     'label_yaml': Door('a.yaml', seeds.label_yamls, _label_table),
     'parameter_yaml': Door('a.yaml', seeds.parameter_yamls, _parameters),
     'mcap': Door('a.mcap', seeds.mcaps, _bag),

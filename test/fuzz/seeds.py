@@ -1,8 +1,10 @@
 """Good inputs, small ones, so that what is spoilt is rarely a mere coordinate."""
 from functools import cache
 import io
+import json
 from pathlib import Path
 import tempfile
+import tomllib
 import zipfile
 
 import numpy as np
@@ -13,7 +15,9 @@ from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import get_typestore
 from rosbags.typesys import Stores
+import yaml
 
+from sgor_ros.core.scan.labels import TABLES
 from sgor_ros.io.messages import point_cloud2
 
 CLOUD = 'sensor_msgs/msg/PointCloud2'
@@ -136,8 +140,20 @@ def plys():
             header.format('binary_big_endian').encode() + packed.astype('>u4').tobytes()]
 
 
+def label_tomls():
+    return [path.read_bytes() for path in sorted(TABLES.glob('*.toml'))]
+
+
 def label_yamls():
-    return [path.read_bytes() for path in sorted((CONFIG / 'labels').glob('*.yaml'))]
+    return [yaml.safe_dump(_table(text)).encode() for text in label_tomls()]
+
+
+def label_jsons():
+    return [json.dumps(_table(text)).encode() for text in label_tomls()]
+
+
+def _table(text):
+    return tomllib.loads(text.decode())
 
 
 def parameter_yamls():

@@ -116,7 +116,7 @@ def test_colcon_installs_what_ros2_run_and_launch_look_for(by_colcon):
     assert (prefix / 'share/ament_index/resource_index/packages/sgor_ros').is_file()
     share = prefix / 'share/sgor_ros'
     for folder, pattern in (('.', 'package.xml'), ('config', '*.yaml'), ('config', '*.rviz'),
-                            ('config', '*.json'), ('config/labels', '*.yaml'), ('launch', '*.py')):
+                            ('config', '*.json'), ('launch', '*.py')):
         expected = {path.name for path in (ROOT / folder).glob(pattern)}
         assert expected, f'nothing to install from {folder}'
         assert expected <= {path.name for path in (share / folder).iterdir()}
