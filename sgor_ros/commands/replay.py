@@ -54,8 +54,7 @@ def main(argv: list[str] | None = None) -> int:
 
 def replay(arguments: Namespace) -> int:
     """Track the clouds of a bag and write the results; 1 where no scan could be registered."""
-    parameters = read_parameters(arguments, [
-        *SgorConfig.settings(), *TrackerConfig.settings(), *StreamConfig.settings()])
+    parameters = read_parameters(arguments, SgorConfig, TrackerConfig, StreamConfig)
     stream = configured(StreamConfig(), arguments, parameters)
     drive = (None if is_bag(arguments.bag_path)
              else open_drive(arguments.bag_path, arguments.sequence))
@@ -129,10 +128,9 @@ def _parser() -> Parser:
     add_visualize(command)
     add_params_file(command)
     add_preset(command)
-    add_settings(command, 'clouds and frames', StreamConfig.settings())
-    add_settings(command, 'tracker', TrackerConfig.settings())
-    add_settings(command, 'registration (defaults are those of the preset outdoor)',
-                 SgorConfig.settings())
+    add_settings(command, 'clouds and frames', StreamConfig)
+    add_settings(command, 'tracker', TrackerConfig)
+    add_settings(command, 'registration (defaults are those of the preset outdoor)', SgorConfig)
     return command
 
 

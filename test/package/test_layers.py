@@ -28,6 +28,11 @@ MAY_IMPORT = {
     'world': set(),
 }
 
+# rooms and files of core, each above those that it may import
+CORE = ('common', 'execution', 'ablation', 'config', 'scan', 'features', 'index', 'matching',
+        'scoring', 'solver', 'icp', 'degeneracy', 'hypotheses', 'prepared_scan', 'preprocessing',
+        'verdict', 'registration', 'prediction_check', 'warmup')
+
 
 def imports_of(path):
     """Return the dotted names that a file imports, anywhere in it, relative ones resolved."""
@@ -66,6 +71,20 @@ def test_a_file_imports_only_what_is_below_it(path):
             assert top not in FILES, f'{layer} imports {name}'
         if layer in {'core', 'tracker'}:
             assert top != 'open3d', f'{layer} imports {name}'
+
+
+@pytest.mark.parametrize('path', [path for path in SOURCES if layer_of(path) == 'core'],
+                         ids=lambda path: str(path.relative_to(PACKAGE)))
+def test_rooms_of_core_lie_on_each_other(path):
+    """No two import each other, by whatever way round."""
+    room = path.relative_to(PACKAGE / 'core').parts[0].removesuffix('.py')
+    if room == '__init__':
+        return
+    below = CORE[:CORE.index(room)]
+    for name in imports_of(path):
+        if name.startswith('sgor_ros.core.'):
+            other = name.split('.')[2]
+            assert other == room or other in below, f'{room} imports {name}'
 
 
 def test_the_public_interface_is_core_and_tracker():
