@@ -2,6 +2,7 @@
 
 Two scans: `register`, `preprocess`, `register_correspondences`, `warm_up`; with the types
 `SemanticScan`, `PreparedScan`, `SgorConfig`, `Registration`, `Status`, `Placement`, `InputError`.
+For keyframes that are kept: `compact`, `CompactScan`.
 Scan after scan: `Tracker`, `TrackerConfig`, `TrackedScan`, `State`.
 Data sets: `open_drive`, `open_drives`, `Drive`.
 
