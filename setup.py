@@ -85,7 +85,7 @@ setup(
     },
     entry_points={
         'console_scripts': [
-            'sgor_node = sgor_ros.ros.node:main',
+            'sgor_node = sgor_ros.ros.main:main',
             *(f'sgor_{name} = sgor_ros.commands.entry:{name}' for name in COMMANDS)],
     },
 )

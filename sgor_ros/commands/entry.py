@@ -7,7 +7,7 @@ from importlib import import_module
 import sys
 
 from ..core.execution.cache import choose_cache_folder
-from .frame import REFUSED
+from .command_line import REFUSED
 
 EXTRA = ('matplotlib', 'rosbags', 'tqdm', 'yaml')
 """What commands import and the library does not: the extra ``commands``."""
