@@ -1,7 +1,7 @@
 """Degenerate directions by hand: poses pushed and slid back, covariances, words."""
+from galleries import moved
 import numpy as np
 import pytest
-from galleries import moved
 from scipy.spatial.transform import Rotation
 
 from sgor_ros.core.degeneracy.directions import DegenerateDirection
