@@ -77,7 +77,7 @@ def outcomes_at(pair, T):
     return score_keypoints(pair.source.index, pair.target.index, np.array(T)[None], 1000)[0]
 
 
-def tested(pair, *competing, T=None, outcomes=None, degenerate=()):
+def verified(pair, *competing, T=None, outcomes=None, degenerate=()):
     """Return a test of a pose; those that compete explain what it explains."""
     T = np.eye(4) if T is None else T
     own = outcomes_at(pair, T)
@@ -108,7 +108,7 @@ def assert_alone(result):
 def test_registered_is_the_pose_of_the_alignment(pair):
     """Scored anew, with the matches that agree with it, nearer than tau_1."""
     alignment = aligned(moved(0.01))
-    test = replace(tested(pair), outcomes=np.zeros(2000, np.int8))
+    test = replace(verified(pair), outcomes=np.zeros(2000, np.int8))
     result = decide(pair, test, alignment, CONFIG)
     assert result.status is Status.REGISTERED
     assert result.success
@@ -125,7 +125,7 @@ def test_registered_is_the_pose_of_the_alignment(pair):
 
 
 def test_without_an_alignment_the_tested_pose_stands_without_a_covariance(pair):
-    test = tested(pair, T=moved(0.02))
+    test = verified(pair, T=moved(0.02))
     result = decide(pair, test, None, CONFIG)
     assert result.status is Status.REGISTERED
     assert result.T_target_source is test.T_target_source
@@ -136,16 +136,16 @@ def test_without_an_alignment_the_tested_pose_stands_without_a_covariance(pair):
 
 def test_inliers_are_nearer_than_tau_1(pair):
     """Exactly half a metre is not nearer than half a metre."""
-    assert decide(pair, tested(pair), aligned(), CONFIG).inliers.tolist() == [
+    assert decide(pair, verified(pair), aligned(), CONFIG).inliers.tolist() == [
         True, True, False, False]
-    assert decide(pair, tested(pair), aligned(), SgorConfig(tau_1=0.6)).inliers.tolist() == [
+    assert decide(pair, verified(pair), aligned(), SgorConfig(tau_1=0.6)).inliers.tolist() == [
         True, True, True, False]
 
 
 def test_refused_below_min_confidence_whatever_competes_or_slides(pair):
     """No alternatives, no directions, no widened covariance for what is not believed."""
     config = CONFIG.replace(min_confidence=0.995)
-    result = decide(pair, tested(pair, moved(8), degenerate=(SLIDE,)), aligned(), config)
+    result = decide(pair, verified(pair, moved(8), degenerate=(SLIDE,)), aligned(), config)
     assert result.status is Status.REFUSED
     assert result.reason == ('confidence 0.99 is below min_confidence 0.99: of the keypoints '
                              '100% agree, 0.0% contradict')
@@ -160,12 +160,12 @@ def test_refused_below_min_confidence_whatever_competes_or_slides(pair):
 
 def test_min_confidence_itself_is_enough(pair):
     config = CONFIG.replace(min_confidence=CONFIDENCE)
-    assert decide(pair, tested(pair), aligned(), config).status is Status.REGISTERED
+    assert decide(pair, verified(pair), aligned(), config).status is Status.REGISTERED
 
 
 def test_an_alignment_that_went_astray_is_refused(pair):
     """It is the aligned pose that is scored: 5 m off, among the walls of the other."""
-    result = decide(pair, tested(pair), aligned(moved(0, 3.0, 0, 20)), CONFIG)
+    result = decide(pair, verified(pair), aligned(moved(0, 3.0, 0, 20)), CONFIG)
     assert result.status is Status.REFUSED
     assert result.confidence < 0.5
     assert result.score == pose_score(outcomes_at(pair, moved(0, 3.0, 0, 20)))
@@ -177,7 +177,7 @@ def test_ambiguous_where_other_poses_stand(pair):
     hidden, guilty = own.copy(), own.copy()
     hidden[:200] = 0
     guilty[:20] = -1
-    test = tested(pair, moved(8), moved(0.1), moved(16), moved(-8, yaw_deg=180),
+    test = verified(pair, moved(8), moved(0.1), moved(16), moved(-8, yaw_deg=180),
                   outcomes=[hidden, own, guilty, own])
     result = decide(pair, test, aligned(), CONFIG)
     assert result.status is Status.AMBIGUOUS
@@ -202,7 +202,7 @@ def test_ambiguous_where_other_poses_stand(pair):
 
 def test_ambiguous_and_sliding_is_ambiguous(pair):
     """The directions are those of each alternative; both covariances are as wide as they say."""
-    test = tested(pair, moved(0, 1, yaw_deg=180), degenerate=(SLIDE, SLIDE))
+    test = verified(pair, moved(0, 1, yaw_deg=180), degenerate=(SLIDE, SLIDE))
     result = decide(pair, test, aligned(), CONFIG)
     assert result.status is Status.AMBIGUOUS
     assert result.degenerate.shape == (0, 6)
@@ -216,7 +216,7 @@ def test_ambiguous_and_sliding_is_ambiguous(pair):
 
 
 def test_without_a_covariance_none_of_the_alternatives_has_one(pair):
-    result = decide(pair, tested(pair, moved(8), degenerate=(SLIDE,)), None, CONFIG)
+    result = decide(pair, verified(pair, moved(8), degenerate=(SLIDE,)), None, CONFIG)
     assert result.status is Status.AMBIGUOUS
     assert result.covariance is result.alternatives[0].covariance is None
 
@@ -227,13 +227,13 @@ def test_without_a_covariance_none_of_the_alternatives_has_one(pair):
     (moved(8, yaw_deg=-6), 'the next 8.0 m apart along (1.00, 0.00, 0.00), turned by 6 deg'),
     (moved(yaw_deg=180), 'the next 0.0 m apart along (0.00, 0.00, 0.00), turned by 180 deg')])
 def test_the_reason_says_where_the_best_of_the_others_lies(pair, other, words):
-    result = decide(pair, tested(pair, other, moved(33)), aligned(), CONFIG)
+    result = decide(pair, verified(pair, other, moved(33)), aligned(), CONFIG)
     assert result.reason == f'ambiguous: 3 placements explain the scans equally well, {words}'
 
 
 def test_the_gap_is_that_to_the_pose_of_the_alignment(pair):
     T = moved(0.1, yaw_deg=0.2)
-    result = decide(pair, tested(pair, moved(8.1, yaw_deg=5.1)), aligned(T), CONFIG)
+    result = decide(pair, verified(pair, moved(8.1, yaw_deg=5.1)), aligned(T), CONFIG)
     assert 'the next 8.0 m apart along (1.00, 0.00, 0.00)' in result.reason
     assert 'turned' not in result.reason
 
@@ -245,7 +245,7 @@ def test_degenerate_where_the_clouds_slide(pair, sigmas, share):
     axes = np.eye(6)[:2]
     free = tuple(DegenerateDirection(axis, sigma, 20.0)
                  for axis, sigma in zip(axes, sigmas, strict=False))
-    result = decide(pair, tested(pair, degenerate=free), aligned(), CONFIG)
+    result = decide(pair, verified(pair, degenerate=free), aligned(), CONFIG)
     assert result.status is Status.DEGENERATE
     assert not result.success
     assert result.reason == 'degenerate: the clouds ' + ' and '.join(
@@ -260,7 +260,7 @@ def test_degenerate_where_the_clouds_slide(pair, sigmas, share):
 
 
 def test_degenerate_without_an_alignment_has_no_covariance(pair):
-    result = decide(pair, tested(pair, degenerate=(SLIDE,)), None, CONFIG)
+    result = decide(pair, verified(pair, degenerate=(SLIDE,)), None, CONFIG)
     assert result.status is Status.DEGENERATE
     assert result.covariance is result.correlated_error is None
 
@@ -268,7 +268,7 @@ def test_degenerate_without_an_alignment_has_no_covariance(pair):
 def test_what_competes_and_does_not_differ_is_no_ambiguity(pair):
     """Nor is what the clouds rule out; the slide still counts."""
     own = outcomes_at(pair, np.eye(4))
-    test = tested(pair, moved(0.1), moved(9), outcomes=[own, 0 * own], degenerate=(SLIDE,))
+    test = verified(pair, moved(0.1), moved(9), outcomes=[own, 0 * own], degenerate=(SLIDE,))
     assert decide(pair, test, aligned(), CONFIG).status is Status.DEGENERATE
     test = replace(test, degenerate=())
     assert decide(pair, test, aligned(), CONFIG).status is Status.REGISTERED
@@ -276,7 +276,7 @@ def test_what_competes_and_does_not_differ_is_no_ambiguity(pair):
 
 def test_refuse_keeps_the_tested_pose(pair):
     own = np.array([1] * 6 + [-1] * 2 + [0] * 2, np.int8)
-    test = replace(tested(pair, moved(8), T=moved(0.45)), outcomes=own)
+    test = replace(verified(pair, moved(8), T=moved(0.45)), outcomes=own)
     result = refuse(pair, test, 'too far', CONFIG)
     assert result.status is Status.REFUSED
     assert result.reason == 'too far'
