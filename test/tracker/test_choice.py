@@ -262,6 +262,7 @@ def twists_of_any_kind(rng):
     return twists
 
 
+@pytest.mark.slow
 def test_whatever_the_free_directions_are_the_information_is_one(driving):
     """Never an exception, nothing negative, and nothing along what is free."""
     rng = np.random.default_rng(0)

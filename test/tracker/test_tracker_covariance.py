@@ -80,6 +80,7 @@ def test_what_errs_alike_adds_up():
     assert np.sqrt(apart.pose[0, 0]) == pytest.approx(0.01 * np.sqrt(10))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('speed', [1.5, 8.0])
 @pytest.mark.parametrize('mode', ['consecutive', 'keyframe'])
 def test_errors_are_as_large_as_is_claimed(mode, speed):

@@ -22,7 +22,8 @@ def direction(*twist, sigma=10.0, lever=20.0):
 
 @pytest.mark.parametrize(('twist', 'shift'), [
     (ALONG_X, True), ((0, 0.8, 0, 0, 0, 0.03), True), (ABOUT_Z, False),
-    ((0.7, 0, 0, 0, 0, 0.05), False), ((0.5, 0.6, 0, 0, 0, 0.05), True)])
+    ((0.7, 0, 0, 0, 0, 0.05), False), ((0.5, 0.6, 0, 0, 0, 0.05), True),
+    ((0.6, 0, 0, 0.5, 0, 0), False)])
 def test_a_twist_is_a_shift_where_the_larger_part_of_its_metre_is(twist, shift):
     assert is_shift(np.array(twist, float)) is shift
 
@@ -61,6 +62,8 @@ def test_a_pose_slides_back_as_far_as_its_directions_let_it():
     slide = direction(1.0, 0, 0, 0, 0, 0.004)
     other = perturbed_poses(T, np.array([[7.0, 2.0, 0.5, 0, 0, 0.028]]))[0]
     np.testing.assert_allclose(slid_back(T, other, (slide,)), moved(3, 3, 0.5), atol=1e-9)
+    rolled = slid_back(moved(), moved(2, roll_deg=50), (direction(1.0, 0, 0, 0.1, 0, 0),))
+    np.testing.assert_allclose(rolled, moved(roll_deg=50 - np.degrees(0.2)), atol=1e-9)
     # the shift alone says how far, whatever the turn is
     turned = perturbed_poses(T, np.array([[7.0, 0, 0, 0, 0, 0.5]]))[0]
     found = slid_back(T, turned, (slide,))
@@ -75,6 +78,9 @@ def test_a_pose_turns_back_about_a_free_axis():
     np.testing.assert_allclose(slid_back(T, moved(3, 1, 0, 100), (shaft,)), T, atol=1e-9)
     np.testing.assert_allclose(slid_back(T, moved(3, 2, 0, 100), (shaft,)), moved(3, 2, 0, 10),
                                atol=1e-9)
+    roll = moved(roll_deg=50)
+    np.testing.assert_allclose(slid_back(moved(), roll, (direction(0, 0, 0, 0.05, 0, 0),)),
+                               moved(), atol=1e-9)
     # of a turn with a by-product it is the turn that says how far
     screw = direction(0.1, 0, 0, 0, 0, 0.05)
     found = slid_back(T, moved(3, 1, 0, 10 + np.degrees(0.5)), (screw,))
@@ -113,6 +119,8 @@ def test_directions_are_unit_and_those_that_others_span_are_left_out():
     found = independent((direction(2, 0, 0, 0, 0, 0), direction(3, 4, 0, 0, 0, 0),
                          direction(0, 1, 0, 0, 0, 0), direction(*ABOUT_Z)))
     np.testing.assert_allclose(found, [ALONG_X, [0.6, 0.8, 0, 0, 0, 0], [0, 0, 0, 0, 0, 1]])
+    short = independent((direction(*ALONG_X), direction(0.06, 0.08, 0, 0, 0, 0)))
+    np.testing.assert_allclose(short, [ALONG_X, [0.6, 0.8, 0, 0, 0, 0]])
     assert independent(()).shape == (0, 6)
     np.testing.assert_allclose(independent((direction(*ALONG_X), direction(*-ALONG_X))),
                                [ALONG_X])

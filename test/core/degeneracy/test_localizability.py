@@ -104,6 +104,13 @@ def test_a_round_shaft_leaves_its_turn_free():
     weak, lever = weak_directions(shaft, shaft, np.eye(4))
     assert len(weak) == 1
     np.testing.assert_allclose(np.abs(weak[0]), [0, 0, 0, 0, 0, 1 / lever], atol=1e-6)
+    # lying, without a ground plane, and long: along x, and about it
+    long = np.concatenate([shaft.points + [0, 0, z] for z in (-12, -6, 0, 6, 12)])
+    lying = index_of(long[:, [2, 0, 1]], np.tile(shaft.normals[:, [2, 0, 1]], (5, 1)), up=None)
+    weak, lever = weak_directions(lying, lying, np.eye(4))
+    assert len(weak) == 2
+    found = weak * np.repeat((1.0, lever), 3)
+    np.testing.assert_allclose(np.linalg.norm(found, axis=0), [1, 0, 0, 1, 0, 0], atol=1e-4)
 
 
 @pytest.mark.parametrize(('share', 'count'), [(0.05, 1), (0.15, 0)])

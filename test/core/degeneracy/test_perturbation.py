@@ -44,6 +44,35 @@ def test_a_shift_is_degenerate_where_four_fifths_of_the_push_stay(forth, back, d
     assert is_degenerate(poses, BOTH, 1.2 * ALONG_X) is degenerate
 
 
+def test_four_fifths_themselves_are_not_enough():
+    poses = np.array([moved(), moved(0.96), moved(-0.96)])
+    assert 0.8 * 1.2 == 0.96
+    assert is_degenerate(poses, BOTH, 1.2 * ALONG_X) is False
+
+
+@pytest.mark.parametrize('length', [0.4, 3.0])
+def test_a_push_of_any_length_is_measured_by_what_it_is(length):
+    """A shift, though it is short; a turn by a long way."""
+    shifted = np.array([moved(), moved(0.9 * length), moved(-0.9 * length)])
+    assert is_degenerate(shifted, BOTH, length * ALONG_X) is True
+    angle = np.degrees(0.9 * length * 0.05)
+    turned = np.array([moved(), moved(roll_deg=angle), moved(roll_deg=-angle)])
+    about_x = length * np.array([0, 0, 0, 0.05, 0, 0])
+    assert is_degenerate(turned, BOTH, about_x) is True
+    assert is_degenerate(np.array([moved(), *turned[:1], *turned[:1]]), BOTH, about_x) is False
+
+
+def test_the_turn_of_a_shift_is_not_asked_for():
+    """By half a metre and 0.4 rad: 0.45 m are enough."""
+    poses = np.array([moved(), moved(0.45), moved(-0.45)])
+    assert is_degenerate(poses, BOTH, np.array([0.5, 0, 0, 0.4, 0, 0])) is True
+
+
+def test_pushes_that_came_to_the_same_place_are_each_compared_with_the_pose():
+    poses = np.array([moved(), moved(yaw_deg=np.degrees(0.06)), moved(yaw_deg=np.degrees(0.055))])
+    assert is_degenerate(poses, BOTH, 1.2 * ABOUT_Z) is True
+
+
 @pytest.mark.parametrize(('forth', 'back', 'degenerate'), [
     (0.06, -0.06, True), (0.05, -0.047, True), (0.047, -0.048, False), (0.06, 0.0, False)])
 def test_a_turn_is_degenerate_where_four_fifths_of_the_push_stay(forth, back, degenerate):
@@ -104,6 +133,33 @@ def test_a_slide_that_ends_soon_is_no_longer_than_that():
     np.testing.assert_array_equal(found.twist, ALONG_X)
     assert found.sigma == pytest.approx(2.4)
     assert found.lever == 20.0
+
+
+def test_a_place_where_it_stands_again_is_not_the_end_of_a_slide():
+    """Pillars each 9.6 m: pushed by that it stands, by 2.4 m it does not."""
+    pillars = index_of(*gallery(pitch=9.6))
+    assert measure(pillars, ALONG_X).sigma == pytest.approx(2.4)
+
+
+@pytest.mark.parametrize('way', [1, -1])
+def test_a_slide_one_way_is_one(way):
+    """Of 3 m that one sensor saw little is left 2.4 m on, where the other saw no further."""
+    long = (-40.0, 3.5) if way < 0 else (-0.5, 40.0)
+    source, target = (index_of(*gallery(0.0, ends=ends)) for ends in ((0.0, 3.0), long))
+    outcomes = score_keypoints(source, target, np.eye(4)[None], 1000)[0]
+    found = measured(source, target, np.eye(4), outcomes, ALONG_X, 20.0, 30.0, (3, 4), 1000)
+    assert found.sigma == pytest.approx(30 / np.sqrt(3), rel=1e-3)
+
+
+def test_the_line_is_through_the_places_and_not_through_the_target():
+    """From 3.8 m beside the middle."""
+    points, normals = gallery(pitch=0.0)
+    source, target = index_of(points - [0, 3.8, 0], normals), index_of(points, normals)
+    T = moved(0, 3.8)
+    outcomes = score_keypoints(source, target, T[None], 1000)[0]
+    found = measured(source, target, T, outcomes, ALONG_X, 20.0, 30.0, (3, 4), 1000)
+    np.testing.assert_allclose(np.abs(found.twist), ALONG_X, atol=1e-2)
+    assert found.sigma == pytest.approx(30 / np.sqrt(3), rel=1e-2)
 
 
 def test_a_turn_stays_the_turn_that_it_was():

@@ -132,6 +132,14 @@ def test_a_turn_counts_as_the_way_of_what_it_moves():
                                0.5 * np.diag([0.002] * 3 + [0.024 / 20] * 3), rtol=1e-9)
 
 
+@pytest.mark.parametrize(('T', 'size'), [(moved(), 0.0), (moved(roll_deg=180), 0.5)])
+def test_rounding_of_a_rotation_makes_no_error_that_is_none(T, size):
+    """A trace beyond 3, or below -1, by a few last digits has no arc cosine."""
+    T[:3, :3] *= 1 + 1e-12
+    np.testing.assert_allclose(correlated_error(T, 20.0, 0.5),
+                               size * np.diag([0.002] * 3 + [0.024 / 20] * 3), atol=1e-12)
+
+
 def test_the_edge_of_the_grid_and_the_middle_range_scale_it():
     root = correlated_error(moved(30.0), 10.0, 0.2)
     np.testing.assert_allclose(root, 0.2 * np.diag([0.02, 0.002, 0.002] + [0.0024] * 3),

@@ -223,7 +223,9 @@ def test_without_a_covariance_none_of_the_alternatives_has_one(pair):
 
 @pytest.mark.parametrize(('other', 'words'), [
     (moved(0, -6, 8), 'the next 10.0 m apart along (0.00, -0.60, 0.80)'),
+    (moved(0, 0.8), 'the next 0.8 m apart along (0.00, 1.00, 0.00)'),
     (moved(8, yaw_deg=4.9), 'the next 8.0 m apart along (1.00, 0.00, 0.00)'),
+    (moved(8, yaw_deg=5.4), 'the next 8.0 m apart along (1.00, 0.00, 0.00), turned by 5 deg'),
     (moved(8, yaw_deg=-6), 'the next 8.0 m apart along (1.00, 0.00, 0.00), turned by 6 deg'),
     (moved(yaw_deg=180), 'the next 0.0 m apart along (0.00, 0.00, 0.00), turned by 180 deg')])
 def test_the_reason_says_where_the_best_of_the_others_lies(pair, other, words):
@@ -363,5 +365,7 @@ def test_the_verdict_on_matches_of_which_none_agrees():
     points = np.zeros((4, 3))
     solution = solution_of(points, points + [9, 0, 0], np.eye(4), None, NOTHING)
     assert decide_by_matches(solution, CONFIG, TIMINGS).confidence == 0.0
-    solution = solution_of(points, points, np.eye(4), [True] * 4, NOTHING)
-    assert decide_by_matches(solution, CONFIG, TIMINGS).confidence == 1.0
+    for count in (1, 4):
+        inliers = np.arange(4) < count
+        solution = solution_of(points, points, np.eye(4), inliers, NOTHING)
+        assert decide_by_matches(solution, CONFIG, TIMINGS).confidence == 1.0
