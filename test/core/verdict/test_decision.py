@@ -250,6 +250,8 @@ def test_degenerate_where_the_clouds_slide(pair, sigmas, share):
     result = decide(pair, verified(pair, degenerate=free), aligned(), CONFIG)
     assert result.status is Status.DEGENERATE
     assert not result.success
+    np.testing.assert_array_equal(result.T_target_source, np.eye(4))
+    assert result.inliers.tolist() == [True, True, False, False]
     assert result.reason == 'degenerate: the clouds ' + ' and '.join(
         ('slide along (1.00, 0.00, 0.00)', 'slide along (0.00, 1.00, 0.00)')[:len(free)])
     np.testing.assert_array_equal(result.degenerate, axes[:len(free)])
@@ -314,6 +316,8 @@ def test_labels_that_one_scan_lacks_are_ignored_with_a_warning(prepared, source,
     pair = Pair(labelled(prepared, source), labelled(prepared, target), points, points,
                 solution_of(points, points), TIMINGS)
     assert no_solution(pair, CONFIG).warnings == words
+    pair = replace(pair, source=replace(pair.source, warnings=('odd',)))
+    assert no_solution(pair, CONFIG).warnings == ('source: odd', *words)
 
 
 def test_low_confidence_in_words():

@@ -48,7 +48,13 @@ ANGLE = np.radians(3.0)
 BOUND = 20.06    # of chi2 with 6 degrees of freedom at 99.73 %
 
 
-@pytest.fixture(scope='module', params=VERDICTS, ids=lambda case: f'{case[0]}-{case[1]}')
+QUICK = {'tunnel', 'facade', 'garage_empty', 'highway', 'courtyard'}
+"""One or two of each verdict, for `make test-fast`."""
+
+
+@pytest.fixture(scope='module', params=[
+    pytest.param(case, marks=() if case[0] in QUICK else pytest.mark.slow, id='-'.join(
+        map(str, case))) for case in VERDICTS])
 def views(request):
     """Return kind, seed, place, and of three pairs the scans and poses: source, then target."""
     kind, seed = request.param
