@@ -3,7 +3,6 @@ from argparse import ArgumentParser
 from argparse import BooleanOptionalAction
 from argparse import Namespace
 from argparse import SUPPRESS
-from collections.abc import Iterable
 from pathlib import Path
 import sys
 from typing import Any
@@ -26,17 +25,28 @@ def add_preset(to: ArgumentParser) -> None:
                     help='settings of the registration to start from')
 
 
-def add_settings(to: ArgumentParser, title: str, settings: Iterable[Setting]) -> None:
-    """Add an option for each setting: ``sigma_d`` becomes ``--sigma-d``."""
+def add_settings(to: ArgumentParser, title: str, config: type[Settings]) -> None:
+    """Add an option for each setting: ``sigma_d`` becomes ``--sigma-d``.
+
+    Those for studies are taken too, and ``--help`` does not show them; so are names of before.
+    """
     group = to.add_argument_group(title)
-    for item in settings:
-        details: dict[str, Any] = {'default': SUPPRESS, 'help': _help(item)}
+    shown = config.shown()
+    for item in config.settings():
+        details: dict[str, Any] = {'default': SUPPRESS,
+                                   'help': _help(item) if item in shown else SUPPRESS}
         if item.kind is bool:
             details['action'] = BooleanOptionalAction
         else:
             details['type'] = item.kind
             details['metavar'] = item.unit or item.kind.__name__.upper()
-        group.add_argument(f'--{item.name.replace("_", "-")}', **details)
+        group.add_argument(_option(item.name), dest=item.name, **details)
+        for old in (old for old, new in config.RENAMED.items() if new == item.name):
+            group.add_argument(_option(old), dest=item.name, **details | {'help': SUPPRESS})
+
+
+def _option(name: str) -> str:
+    return f'--{name.replace("_", "-")}'
 
 
 def add_params_file(to: ArgumentParser) -> None:
@@ -59,21 +69,22 @@ def configured[S: Settings](start: S, arguments: Namespace, parameters: dict[str
     InputError
         A value that is refused.
     """
+    named = start.current(parameters)
     changed = {}
     for item in start.settings():
         option = getattr(arguments, item.name, None)
         if option is not None:
             changed[item.name] = option
-        elif item.name in parameters:
-            changed[item.name] = parameters[item.name]
+        elif item.name in named:
+            changed[item.name] = named[item.name]
     return start.replace(**changed)
 
 
-def read_parameters(arguments: Namespace, known: Iterable[Setting]) -> dict[str, Any]:
+def read_parameters(arguments: Namespace, *known: type[Settings]) -> dict[str, Any]:
     """Return the parameters of the ROS YAML file, of all its nodes together, if one was given.
 
-    Names that are not among the `known` settings get a warning: the file may serve a node, which
-    has more, or the name may be misspelt.
+    Names that are no settings of the `known` configurations get a warning: the file may serve a
+    node, which has more, or the name may be misspelt.
 
     Raises
     ------
@@ -93,7 +104,9 @@ def read_parameters(arguments: Namespace, known: Iterable[Setting]) -> dict[str,
     except (AttributeError, KeyError, TypeError) as error:
         raise InputError(f'--params-file {path}: expected "/**: ros__parameters:" and settings '
                          'below it') from error
-    unknown = sorted(map(str, parameters.keys() - {item.name for item in known}))
+    names = {name for config in known
+             for name in (*(item.name for item in config.settings()), *config.RENAMED)}
+    unknown = sorted(map(str, parameters.keys() - names))
     if unknown:
         print(f'warning: {path}: no settings of this command, so ignored: {", ".join(unknown)}',
               file=sys.stderr)

@@ -25,10 +25,10 @@ from ..io.plots import plot_registration
 from ..io.scans import read_scan
 from ..io.writing import check_file
 from ..io.writing import new_file
-from .frame import FAILED
-from .frame import OK
-from .frame import Parser
-from .frame import run
+from .command_line import FAILED
+from .command_line import OK
+from .command_line import Parser
+from .command_line import run
 from .options import add_params_file
 from .options import add_preset
 from .options import add_settings
@@ -47,7 +47,7 @@ def register_files(arguments: Namespace) -> int:
     """Register and tell; 1 where the scans could not be registered."""
     _check_outputs(arguments)
     config = configured(PRESETS[arguments.preset](), arguments,
-                        read_parameters(arguments, SgorConfig.settings()))
+                        read_parameters(arguments, SgorConfig))
     if arguments.visualize is not None:
         visualize.check(arguments.visualize)
     convention = arguments.target_label_convention or config.label_convention
@@ -96,8 +96,7 @@ def _parser() -> Parser:
                          f'({", ".join(PICTURES)}), likewise')
     add_visualize(command)
     add_params_file(command)
-    add_settings(command, 'settings (defaults are those of the preset outdoor)',
-                 SgorConfig.settings())
+    add_settings(command, 'settings (defaults are those of the preset outdoor)', SgorConfig)
     return command
 
 

@@ -1,6 +1,8 @@
 """The method: numpy arrays in, result objects out. No ROS, no printing.
 
-`registration` is the method on one screen. The rooms: `scan` describes one scan, `matching` pairs
-two, `solver` is the paper's Sec. III, `trust` judges, `common` is what all of them use.
+`registration` is the method on one screen, `preprocessing` what is done to each scan before. The
+rooms, each above those that it uses: `common`, `execution`, `scan`, `features`, `index`,
+`matching`, `scoring`, `solver` (the paper's Sec. III), `icp`, `degeneracy`, `hypotheses`,
+`verdict`.
 """
 from .execution import threads as threads  # first: it says where numba keeps its code

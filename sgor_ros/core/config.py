@@ -4,9 +4,10 @@ from functools import lru_cache
 import math
 from typing import Self
 
+from .ablation import Ablation
 from .common.settings import InputError
+from .common.settings import renamed
 from .common.settings import setting
-from .common.settings import Settings
 from .common.settings import Value
 
 PAPER_STEPS: dict[str, Value] = {
@@ -14,148 +15,63 @@ PAPER_STEPS: dict[str, Value] = {
     'sampled_keypoints': True, 'quick_keypoints': 0, 'match_within_labels': False,
     'unlabelled_attempt': False, 'height_gate': 0.0, 'context_weight': 0.0, 'moving_vote': True,
     'weight_cutoff': 6.0, 'cloud_check': False, 'refinement_rounds': 1,
-    'local_refinement': False, 'min_inliers': 0, 'rival_radius': 0.0, 'min_confidence': 0.0}
+    'local_refinement': False, 'min_inliers': 0, 'hypothesis_radius': 0.0, 'min_confidence': 0.0}
 """Each of them the paper, where the default goes beyond it; and a fixed scale."""
 
 
+@renamed(rival_radius='hypothesis_radius', evidence_reach='max_correspondence_distance',
+         local_reach='gicp_max_correspondence_distance')
 @dataclass(frozen=True)
-class SgorConfig(Settings):
+class SgorConfig(Ablation):
     """Settings of preprocessing and registration; ``SgorConfig()`` is for any space.
 
     Lengths are those for streets; ``scaled`` fits them to smaller spaces. Where the paper prints
-    no value (all radii and sizes), the defaults were measured; see ``docs/method.md``.
+    no value (all radii and sizes), the defaults were measured; see ``docs/method.md``. What only
+    studies change are the fields of `Ablation`.
     """
 
     scale: float = setting(
         0.0, 'All lengths but max_range are those for streets and are multiplied by this; 0: it '
         'follows from the scans, 1 for streets and courtyards, a half for corridors, and so on',
-        minimum=0.0, maximum=10.0)
-
-    # scan -> semantic-geometric space (Sec. III-B)
+        minimum=0.0, maximum=10.0, group='space')
     label_convention: str = setting(
         'semantickitti', 'What the label ids mean: semantickitti, semantickitti_train, nuscenes, '
-        'nuscenes16, autoware_frnet, autoware_ptv3, carla, rellis or the path of a YAML file')
+        'nuscenes16, autoware_frnet, autoware_ptv3, carla, rellis or the path of a YAML file',
+        group='sensor')
     min_range: float = setting(
-        1.0, 'Points nearer to the sensor are dropped', 'm', minimum=0.0, maximum=100.0)
+        1.0, 'Points nearer to the sensor are dropped', 'm', minimum=0.0, maximum=100.0,
+        group='sensor')
     max_range: float = setting(
-        80.0, 'Points farther from the sensor are dropped', 'm', minimum=0.5, maximum=1000.0)
+        80.0, 'Points farther from the sensor are dropped', 'm', minimum=0.5, maximum=1000.0,
+        group='sensor')
     voxel_size: float = setting(
-        0.5, 'Edge of the voxel grid that thins a scan', 'm', minimum=0.01, maximum=10.0)
-    max_voxels: int = setting(
-        40000, 'Voxels of a scan; more are thinned evenly, so that any cloud ends in time',
-        minimum=100, maximum=1000000)
-
-    # secondary ground segmentation (Sec. III-B, Eq. 2-3)
+        0.5, 'Edge of the voxel grid that thins a scan', 'm', minimum=0.01, maximum=10.0,
+        group='sensor')
     sigma_g: float = setting(
-        0.25, 'Points nearer to the ground plane are ground', 'm', minimum=0.005, maximum=5.0)
-    secondary_ground: bool = setting(
-        True, 'Segment the ground a second time by distance; false: by labels only (ablation 3)')
-    labelled_ground: bool = setting(
-        False, 'Of the points near the plane only those with a ground label are ground, the '
-        'narrow reading of Eq. 3; false: each is, the wide one')
-    robust_ground: bool = setting(
-        True, 'Find the ground plane by consensus of voxels near the sensor, and by geometry '
-        'where there are no ground labels (beyond the paper); false: SVD of all ground points')
-    ground_radius: float = setting(
-        25.0, 'Horizontal reach of the ground plane fit when robust_ground is on', 'm',
-        minimum=1.0, maximum=1000.0)
-    min_ground_points: int = setting(
-        50, 'With fewer voxels there is no ground plane', minimum=3, maximum=100000)
-
-    # features and correspondences (Sec. III-B)
-    correspondence_preprocessing: bool = setting(
-        True, 'Leave out ground and classes that only one scan has; false: ablation 1')
-    drop_ground_labels: str = setting(
-        'regional', 'Which ground labels off the plane stay out of matching too: point, those of '
-        'single points (Eq. 4); regional, those of the vote; none', choices=(
-            'regional', 'point', 'none'))
-    normal_radius: float = setting(
-        1.5, 'Neighbourhood of a normal', 'm', minimum=0.01, maximum=20.0)
-    descriptor_radius: float = setting(
-        3.5, 'Neighbourhood of an FPFH descriptor', 'm', minimum=0.02, maximum=50.0)
-    vote_radius: float = setting(
-        1.0, 'Neighbourhood of the regional label vote', 'm', minimum=0.0, maximum=20.0)
-    max_correspondences: int = setting(
-        8000, 'Keypoints to match; more are thinned evenly', minimum=10, maximum=50000)
-    sampled_keypoints: bool = setting(
-        False, 'Draw max_correspondences keypoints of each scan at random, as the protocols of '
-        'KITTI do; false: those of the source are matched to all of the target')
-    sampling_seed: int = setting(
-        0, 'Of that draw; another one gives another sample', minimum=0, maximum=2**31 - 1)
-    quick_keypoints: int = setting(
-        1000, 'Keypoints of a first attempt; all are matched only when that is refused. 0: no '
-        'first attempt (beyond the paper)', minimum=0, maximum=50000)
-    quick_groups: int = setting(
-        25, 'Groups of the first attempt', minimum=1, maximum=5000)
-    match_within_labels: bool = setting(
-        True, 'Match only points of the same regional label (beyond the paper)')
-    unlabelled_attempt: bool = setting(
-        True, 'Match what is refused once more by geometry alone, or, where there are no labels, '
-        'without the context (beyond the paper)')
-    height_gate: float = setting(
-        0.5, 'Match only points whose heights over the ground differ by less; 0: off '
-        '(beyond the paper)', 'm', minimum=0.0, maximum=20.0)
-    context_weight: float = setting(
-        1.5, 'Weight of the semantic context beside the descriptor; 0: off (beyond the paper)',
-        minimum=0.0, maximum=100.0)
-    context_scale: float = setting(
-        1.5, 'Finest of the three scales of the semantic context', 'm', minimum=0.05, maximum=20.0)
-    moving_vote: bool = setting(
-        False, 'Let movable classes (people, moving cars) take part')
-
-    # grouping (Sec. III-B)
-    groups: int = setting(500, 'Key correspondences L', minimum=1, maximum=5000)
-    group_size: int = setting(2000, 'Correspondences in a group k', minimum=3, maximum=20000)
-    group_keep: int = setting(12, 'Correspondences kept in a group k_1', minimum=3, maximum=1000)
-    key_spacing: float = setting(
-        1.0, 'Keys nearer to a stronger key give way to others', 'm', minimum=0.0, maximum=20.0)
-
-    # semantic-geometric consistency (Sec. III-C)
+        0.25, 'Points nearer to the ground plane are ground', 'm', minimum=0.005, maximum=5.0,
+        group='thresholds')
     sigma_d: float = setting(
         0.4, 'Two correspondences are consistent when their lengths differ by less', 'm',
-        minimum=0.005, maximum=5.0)
-    weight_cutoff: float = setting(
-        1.0, 'Multiple of sigma_d beyond which the weights W_m are zero', minimum=1.0, maximum=8.0)
-    semantics: str = setting(
-        'loose', 'Semantic consistency: tight or regional; hard: of single points (ablation 6); '
-        'none: geometry only (ablation 5)', choices=('loose', 'hard', 'none'))
-
-    # two-stage verification and refinement (Sec. III-D, III-E)
-    cloud_check: bool = setting(
-        True, 'Choose among hypotheses by the evidence of the clouds instead of the truncated '
-        'distance (beyond the paper)')
-    ground_check: bool = setting(
-        True, 'Refuse hypotheses that tilt the ground; false: ablation 8')
+        minimum=0.005, maximum=5.0, group='thresholds')
     sigma_theta: float = setting(
         math.radians(5.0), 'Largest angle between the ground normals', 'rad',
-        minimum=0.001, maximum=math.pi)
+        minimum=0.001, maximum=math.pi, group='thresholds')
     tau_1: float = setting(
         0.6, 'Correspondences nearer than this under the best hypothesis refine it', 'm',
-        minimum=0.005, maximum=5.0)
-
-    refinement_rounds: int = setting(
-        3, 'Times that the refinement fits; the paper: once', minimum=1, maximum=100)
-
-    # local refinement on the clouds and acceptance (beyond the paper)
-    local_refinement: bool = setting(
-        True, 'Refine on the clouds by GICP, from which a covariance follows')
-    local_reach: float = setting(
-        0.5, 'Farthest pair of points that the local refinement uses', 'm',
-        minimum=0.02, maximum=10.0)
-    min_inliers: int = setting(
-        10, 'Fewer inliers, or inliers on a line, are a failure; 0: neither is asked (beyond the '
-        'paper)', minimum=0, maximum=10000)
-    evidence_reach: float = setting(
-        0.6, 'Keypoints with one of the same label nearer than this under the result agree', 'm',
-        minimum=0.01, maximum=10.0)
-    rival_radius: float = setting(
-        30.0, 'Other placements that explain the scans are looked for so far from the answer; 0: '
-        'not at all (beyond the paper)', 'm', minimum=0.0, maximum=500.0)
+        minimum=0.005, maximum=5.0, group='thresholds')
     min_confidence: float = setting(
         0.85, 'Results below this confidence are failures; 0: accept all',
-        minimum=0.0, maximum=1.0)
-
-    threads: int = setting(2, 'Processor cores to use', minimum=1, maximum=64)
+        minimum=0.0, maximum=1.0, group='trust')
+    hypothesis_radius: float = setting(
+        30.0, 'Other placements that explain the scans are looked for so far from the answer; 0: '
+        'not at all (beyond the paper)', 'm', minimum=0.0, maximum=500.0, group='trust')
+    max_correspondences: int = setting(
+        8000, 'Keypoints to match; more are thinned evenly', minimum=10, maximum=50000,
+        group='speed')
+    max_voxels: int = setting(
+        40000, 'Voxels of a scan; more are thinned evenly, so that any cloud ends in time',
+        minimum=100, maximum=1000000, group='speed')
+    threads: int = setting(2, 'Processor cores to use', minimum=1, maximum=64, group='speed')
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -185,7 +101,8 @@ class SgorConfig(Settings):
             scale=1.0, min_range=0.0, max_range=20.0, voxel_size=0.05, sigma_g=0.03,
             normal_radius=0.10, descriptor_radius=0.25, vote_radius=0.10, context_scale=0.15,
             height_gate=0.0, key_spacing=0.1, sigma_d=0.10, tau_1=0.10, ground_check=False,
-            local_reach=0.10, evidence_reach=0.10, rival_radius=5.0)
+            gicp_max_correspondence_distance=0.10, max_correspondence_distance=0.10,
+            hypothesis_radius=5.0)
 
     @classmethod
     def paper(cls) -> Self:
@@ -207,6 +124,21 @@ class SgorConfig(Settings):
         Lengths, thresholds and ablations stay; nothing is refused.
         """
         return self.replace(scale=self.scale or 1.0, **PAPER_STEPS)
+
+
+PREPARATION = (
+    'label_convention', 'min_range', 'max_range', 'voxel_size', 'max_voxels', 'sigma_g',
+    'secondary_ground', 'labelled_ground', 'robust_ground', 'ground_radius', 'min_ground_points',
+    'correspondence_preprocessing', 'drop_ground_labels', 'normal_radius', 'descriptor_radius',
+    'vote_radius', 'context_weight', 'context_scale', 'moving_vote',
+    'max_correspondence_distance')
+"""What a scan is prepared with, besides the scale: registrations that differ in it cannot share
+one."""
+
+
+def prepares_alike(one: SgorConfig, other: SgorConfig) -> bool:
+    """Return whether a scan prepared with one configuration serves the other."""
+    return all(getattr(one, name) == getattr(other, name) for name in (*PREPARATION, 'scale'))
 
 
 @lru_cache(maxsize=32)

@@ -24,10 +24,6 @@ from .verdict.decision import Pair
 from .verdict.decision import refuse
 from .verdict.result import Registration
 
-LEAST_CONFIDENCE = SgorConfig().min_confidence
-"""A lower `min_confidence` does not hold here: whoever accepts any answer of `register` would
-never hear of another one."""
-
 
 def check_prediction(source: PreparedScan, target: PreparedScan,
                      T_target_source: NDArray[np.float64], config: SgorConfig) -> Registration:
@@ -47,23 +43,21 @@ def check_prediction(source: PreparedScan, target: PreparedScan,
     Returns
     -------
     Registration
-        Its correspondences are keypoints that lie on each other. Without success it says nothing
-        but that this transformation is not confirmed: ask `register`.
+        Its correspondences are keypoints that lie on each other. Without success it tells
+        only that this transformation is not confirmed: ask `register`.
 
     Raises
     ------
     InputError
-        The scans are prepared at two scales; or `rival_radius` is 0, for without competing
+        The scans are prepared at two scales; or `hypothesis_radius` is 0, for without competing
         hypotheses nothing is confirmed.
     """
     if source.scale != target.scale:
         raise InputError(f'source: prepared at scale {source.scale:g}, target at {target.scale:g}')
-    if config.rival_radius == 0:
-        raise InputError('rival_radius = 0: a prediction has to compete with others')
+    if config.hypothesis_radius == 0:
+        raise InputError('hypothesis_radius = 0: a prediction has to compete with others')
     clock = Stopwatch()
     config = config.scaled(source.scale)
-    if config.min_confidence < LEAST_CONFIDENCE:
-        config = config.replace(min_confidence=LEAST_CONFIDENCE)
     with cores(config.threads):
         test, alignment = run_both(
             config.threads, partial(_compete, source, target, T_target_source, config, clock),
@@ -86,7 +80,7 @@ def _compete(source: PreparedScan, target: PreparedScan, T_target_source: NDArra
 
 def _unconfirmed(pair: Pair, test: HypothesisTest, alignment: Alignment | None,
                  config: SgorConfig) -> str:
-    """Say why a pose is not confirmed before it is decided on; empty where it may be."""
+    """Return why a pose is not confirmed, before the verdict; empty where it may be."""
     score = pose_score(test.outcomes)
     if score.confidence < config.min_confidence:
         return low_confidence(score, config)

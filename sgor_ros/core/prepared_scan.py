@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from numpy.typing import ArrayLike
 
 from .common.settings import InputError
+from .config import PREPARATION
 from .config import SgorConfig
 from .execution.lazy import Lazy
 from .features.features import Features
@@ -55,9 +56,32 @@ class PreparedScan:
     timings: dict[str, float]
     given: Given | None = None
 
+    def check(self, config: SgorConfig, name: str) -> None:
+        """Refuse a configuration that this scan was not prepared with.
+
+        Label conventions may differ: labels are classes by now. So may scales, of which the larger
+        is taken.
+
+        Parameters
+        ----------
+        config : SgorConfig
+        name : str
+            What to call the scan.
+
+        Raises
+        ------
+        InputError
+            Naming the first setting that differs.
+        """
+        for item in PREPARATION:
+            mine, asked = getattr(self.config, item), getattr(config, item)
+            if mine != asked and item != 'label_convention':
+                raise InputError(f'{name}: prepared with {item} = {mine!r}, not with {asked!r}; '
+                                 'preprocess it with the configuration of the registration')
+
     @property
     def surface(self) -> Surface | None:
-        """Cloud for the local refinement; None where that is off or there are too few points."""
+        """Cloud for the local refinement; None where there are too few points."""
         return self.surfaced()
 
     def __repr__(self) -> str:

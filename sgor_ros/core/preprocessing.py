@@ -125,7 +125,8 @@ def _prepare(scan: SemanticScan, asked: SgorConfig, given: Given | None,
             warnings.append('no ground labels: ground plane found by geometry')
     with clock('index'):
         index = scan_index(ranges, features, directions,
-                           None if ground is None else ground.normal, config.evidence_reach)
+                           None if ground is None else ground.normal,
+                           config.max_correspondence_distance)
     return PreparedScan(
         scan, asked, scale, features, ground, index,
         Lazy(partial(_fixed_surface, points, labels, convention, config)), tuple(warnings),
@@ -170,8 +171,6 @@ def _segmented(cloud: VoxelCloud, points: NDArray[np.float32], labels: NDArray[n
 def _fixed_surface(points: NDArray[np.float32], labels: NDArray[np.uint8],
                    convention: LabelConvention, config: SgorConfig) -> Surface | None:
     """Return the surface of all that stands still, on a grid that no other scan has."""
-    if not config.local_refinement:
-        return None
     cloud = voxel_grid(points, labels, config.voxel_size, shift_of(points))
     if len(cloud.points) > config.max_voxels:
         cloud = cloud[thin(len(cloud.points), config.max_voxels)]

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from numpy.typing import NDArray
 
+from .common.settings import InputError
 from .config import SgorConfig
 from .execution.stopwatch import Stopwatch
 from .execution.tasks import run_both
@@ -51,7 +52,7 @@ class Attempt:
 
     @property
     def score(self) -> PoseScore:
-        """That of the pose; nothing speaks for one that is not there."""
+        """That of the pose; zero without one."""
         return PoseScore(0.0, 0.0) if self.test is None else pose_score(self.test.outcomes)
 
 
@@ -65,7 +66,7 @@ def register(source: Scan | ArrayLike, target: Scan | ArrayLike,
         Prepared scans are used as they are: prepare once, register often. Arrays are points
         without labels, metres.
     config : SgorConfig, optional
-        ``SgorConfig()`` where none is given.
+        Where none is given, that of a prepared scan, or ``SgorConfig()``.
 
     Returns
     -------
@@ -75,10 +76,10 @@ def register(source: Scan | ArrayLike, target: Scan | ArrayLike,
     Raises
     ------
     InputError
-        What is no scan, or no configuration.
+        What is no scan, or no configuration; a scan that was prepared with another one.
     """
-    config = SgorConfig.given(config)
     scans = as_scan(source, 'source'), as_scan(target, 'target')
+    config = _configuration(*scans, config)
     clock = Stopwatch()
     with cores(config.threads):
         one, other = _prepared(*scans, config, clock)
@@ -98,6 +99,22 @@ def register(source: Scan | ArrayLike, target: Scan | ArrayLike,
     return replace(result, warnings=(*result.warnings, *hints)) if hints else result
 
 
+def _configuration(source: Scan, target: Scan, asked: SgorConfig | None) -> SgorConfig:
+    """Return the configuration to register with; prepared scans bring theirs, or fit it."""
+    prepared = {name: scan for name, scan in (('source', source), ('target', target))
+                if isinstance(scan, PreparedScan)}
+    if asked is None and prepared:
+        config = next(iter(prepared.values())).config
+    else:
+        config = SgorConfig.given(asked)
+    for name, scan in prepared.items():
+        scan.check(config, name)
+        if asked is not None and config.scale not in (0.0, scan.scale):
+            raise InputError(f'{name}: prepared at scale {scan.scale:g}, not at {config.scale:g}; '
+                             'preprocess it with the configuration of the registration')
+    return config
+
+
 def _prepared(one: Scan, other: Scan, config: SgorConfig, clock: Stopwatch
               ) -> tuple[PreparedScan, PreparedScan]:
     """Return both scans prepared, at one scale."""
@@ -114,7 +131,7 @@ def _prepared(one: Scan, other: Scan, config: SgorConfig, clock: Stopwatch
 
 def _best_attempt(source: PreparedScan, target: PreparedScan, config: SgorConfig,
                   clock: Stopwatch) -> Attempt:
-    """Return the first attempt that the clouds believe; where they believe none, the best."""
+    """Return the first attempt above min_confidence; where there is none, the best."""
     labelled = all(scan.features.labelled_share > 0 for scan in (source, target))
     doubtful = source.scale < 1 and any(
         scan.ground is None or scan.ground.source == 'geometry' for scan in (source, target))
@@ -182,6 +199,8 @@ def _attempt(source: PreparedScan, target: PreparedScan, config: SgorConfig, clo
 def aligned(source: PreparedScan, target: PreparedScan, T_target_source: NDArray[np.float64],
             config: SgorConfig, clock: Stopwatch) -> Alignment | None:
     """Refine a transformation on the clouds; None where that is off or they are too small."""
+    if not config.local_refinement:
+        return None
     with clock('surface'):
         p, q = run_both(config.threads, source.surfaced, target.surfaced)
     if p is None or q is None:

@@ -55,9 +55,9 @@ def compiled(config: SgorConfig | None = None) -> bool:
 
 def _register_all(config: SgorConfig) -> None:
     walls, size = _walls(config)
-    prepared = preprocess(SemanticScan(walls, np.zeros(len(walls), np.int64)),
-                          config.replace(min_range=0.0, max_range=4 * size))
-    register(prepared, prepared, config)
+    near = config.replace(min_range=0.0, max_range=4 * size)
+    prepared = preprocess(SemanticScan(walls, np.zeros(len(walls), np.int64)), near)
+    register(prepared, prepared, near)
     _solve(config)
 
 

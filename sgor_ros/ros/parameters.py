@@ -95,11 +95,21 @@ def _values_of(config: Settings, parameters: list[Parameter]) -> dict[str, Value
 
 
 def _declare(node: Node, config: type[Settings], read_only: bool = False) -> dict[str, Value]:
-    """Declare all settings of a configuration and return the values that the user gave them."""
+    """Declare the settings of a configuration and return the values that the user gave them.
+
+    Those for studies are declared only where the user gives them, and so are the names of before.
+    """
+    given = node._parameter_overrides
+    shown = config.shown()
+    items = [*shown, *(item for item in config.settings()
+                       if item not in shown and item.name in given)]
+    before = {new: old for old, new in config.RENAMED.items() if old in given}
+    for new, old in before.items():
+        node.get_logger().warning(f'parameter {old}: it is {new} now')
     try:
         return {item.name: node.declare_parameter(
-            item.name, item.default, _descriptor(item, read_only)).value
-            for item in config.settings()}
+            item.name, given[before[item.name]].value if item.name in before else item.default,
+            _descriptor(item, read_only)).value for item in items}
     except InvalidParameterTypeException as error:
         raise InputError(f'{error} (a double needs its point: 3.0, not 3)') from error
     except ParameterException as error:
@@ -126,7 +136,8 @@ def _descriptor(item: Setting, read_only: bool) -> ParameterDescriptor:
 def _warn_of_unknown(node: Node) -> None:
     """Name what the user set and the node does not have: rclpy drops it without a word."""
     for name in node._parameter_overrides:
-        if not node.has_parameter(name) and not name.startswith('qos_overrides.'):
+        if (not node.has_parameter(name) and name not in SgorConfig.RENAMED
+                and not name.startswith('qos_overrides.')):
             node.get_logger().warning(f'parameter {name}: there is none of that name; ignored')
 
 
@@ -137,9 +148,9 @@ def yaml_files() -> dict[str, str]:
     return {
         'sgor_node.yaml': _yaml(
             'All parameters of sgor_node with their defaults.',
-            ('Registration; these can be changed while the node runs', SgorConfig.settings(), {}),
-            ('Tracker; these can be changed while the node runs', TrackerConfig.settings(), {}),
-            ('Node; read when it starts', NodeConfig.settings(), {})),
+            ('Registration; these can be changed while the node runs', SgorConfig.shown(), {}),
+            ('Tracker; these can be changed while the node runs', TrackerConfig.shown(), {}),
+            ('Node; read when it starts', NodeConfig.shown(), {})),
         'indoor.yaml': _yaml(
             'Rooms of a few metres: what differs from the defaults.',
             ('SgorConfig.indoor()', _named(SgorConfig, indoor), indoor)),
@@ -163,8 +174,11 @@ def _yaml(title: str, *sections: tuple[str, Iterable[Setting], dict[str, Value]]
              '3.0, not 3.',
              '/**:', '  ros__parameters:']
     for heading, settings, values in sections:
-        lines += ['', f'    # ---- {heading} ----']
+        group = None
         for item in settings:
+            if item.group != group:
+                group = item.group
+                lines += ['', f'    # ---- {heading}{group and f": {group}"} ----']
             lines += textwrap.wrap(item.description + _bounds(item), 99, initial_indent='    # ',
                                    subsequent_indent='    # ')
             lines.append(f'    {item.name}: {_scalar(values.get(item.name, item.default))}')

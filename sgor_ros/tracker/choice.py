@@ -1,4 +1,4 @@
-"""What a registration says in the light of the motion so far: which placement, or none."""
+"""Which placement of a registration agrees with the predicted motion, if any (gating)."""
 from collections.abc import Callable
 from dataclasses import dataclass
 from dataclasses import replace
@@ -93,6 +93,31 @@ def choose(found: Registration, motion: Motion, stamp_ns: int, config: TrackerCo
             f'placement{"s" * (count > 1)} would fit the motion so far')
 
 
+def relocalised(found: Registration, T_reference_keyframe: Array | None, motion: Motion,
+                stamp_ns: int, config: TrackerConfig) -> Step | str:
+    """Return the step to a keyframe that is not the reference, or why there is none.
+
+    Parameters
+    ----------
+    found : Registration
+        To that keyframe; it has to stand for itself.
+    T_reference_keyframe : (4, 4) float64 or None
+        Where the keyframe is; None where it is of another track, which no motion leads to.
+    motion : Motion
+        Of the last pose, relative to the reference.
+    stamp_ns : int
+        Of the scan.
+    config : TrackerConfig
+    """
+    if found.status is not Status.REGISTERED or found.T_target_source is None:
+        return found.reason
+    step = Step(found.T_target_source, found.covariance, found.correlated_error)
+    if T_reference_keyframe is None:
+        return step
+    return motion.impossible(stamp_ns, T_reference_keyframe @ found.T_target_source,
+                             config) or step
+
+
 def is_likely(found: Registration, prediction: Motion) -> bool:
     """Whether a registration that stands for itself lies where it was predicted."""
     assert found.T_target_source is not None
@@ -101,7 +126,7 @@ def is_likely(found: Registration, prediction: Motion) -> bool:
 
 
 def _free(found: Registration) -> Array:
-    """Return (K, 6) directions in which the best placement slides; its rivals slide with it.
+    """Return (K, 6) degenerate directions of the best placement; the alternatives share them.
 
     Its wide covariance alone would be taken for a weak measurement, scan after scan.
     """
@@ -157,7 +182,7 @@ def _information(placement: Placement, besides: Array | float = 0.0) -> Array:
     root = np.linalg.inv(np.linalg.cholesky(covariance + besides))    # root^T root: information
     if len(placement.degenerate):
         free = root @ placement.degenerate.T
-        # its length says nothing, so directions in metres and radians weigh alike
+        # lengths cancel, so directions in metres and radians weigh alike
         spanning, sizes, _ = np.linalg.svd(free / np.linalg.norm(free, axis=0),
                                            full_matrices=False)
         spanning = spanning[:, sizes > DEPENDENT * sizes[0]]

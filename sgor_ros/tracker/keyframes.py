@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.config import prepares_alike
 from ..core.config import SgorConfig
 from ..core.prepared_scan import PreparedScan
 from ..core.preprocessing import preprocess
@@ -20,6 +21,8 @@ class Keyframe:
 
     Attributes
     ----------
+    id : int
+        Its own among all keyframes of a tracker; stamps may come twice, or go back.
     prepared : PreparedScan
     stamp_ns : int
     track_id : int
@@ -30,6 +33,7 @@ class Keyframe:
         Share of agreeing keypoints of the first scan that was registered to it.
     """
 
+    id: int
     prepared: PreparedScan
     stamp_ns: int
     track_id: int
@@ -39,7 +43,7 @@ class Keyframe:
 
     def ready(self, config: SgorConfig) -> 'Keyframe':
         """Return it prepared with these settings: they may have changed since."""
-        if self.prepared.config == config:
+        if prepares_alike(self.prepared.config, config):
             return self
         return replace(self, prepared=preprocess(self.prepared.scan, config))
 
@@ -76,7 +80,7 @@ class Keyframes:
 
     def keep(self, keyframe: Keyframe, limit: int) -> None:
         """Remember a keyframe, if it is not remembered yet."""
-        if all(one.stamp_ns != keyframe.stamp_ns for one in self._kept):
+        if all(one.id != keyframe.id for one in self._kept):
             self.add(keyframe, limit)
 
     def last(self, track_id: int) -> Keyframe | None:
@@ -96,7 +100,7 @@ class Keyframes:
             Only those of tracks with a lower number.
         """
         # the newest first: they are most likely near
-        others = [one for one in reversed(self._kept) if one.stamp_ns != but.stamp_ns
+        others = [one for one in reversed(self._kept) if one.id != but.id
                   and (before_track is None or one.track_id < before_track)]
         if not others:
             return []

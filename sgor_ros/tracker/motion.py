@@ -61,12 +61,17 @@ class Motion:
         return self.covariance[6:, 6:]
 
     def is_narrow(self) -> bool:
-        """Whether it says where the scan is to within what a fit to the clouds pulls in."""
+        """Whether the predicted position is certain to within the reach of a fit to the clouds."""
         return float(np.trace(self.pose_covariance[:3, :3])) < NARROW_M**2
 
     def seconds_to(self, stamp_ns: int) -> float:
         """Return the time from here to a stamp."""
         return (stamp_ns - self.stamp_ns) * 1e-9
+
+    def before(self, stamp_ns: int, config: TrackerConfig) -> Self:
+        """Return this motion; where its stamp lies in the future of another, its place alone."""
+        return self if self.stamp_ns < stamp_ns else self.unknown(
+            stamp_ns - 1, self.T_reference_sensor, self.pose_covariance, config)
 
     def predict(self, stamp_ns: int, config: TrackerConfig) -> Self:
         """Go on with the same velocity, which may change by the accelerations of the settings."""
@@ -111,16 +116,16 @@ class Motion:
                           self.twist + by[6:], (P + P.T) / 2)
 
     def impossible(self, stamp_ns: int, T_reference_sensor: Array, config: TrackerConfig) -> str:
-        """Say which bound a placement at a stamp breaks; empty if none."""
+        """Return which bound a placement at a stamp breaks, in words; empty if none."""
         seconds = max(self.seconds_to(stamp_ns), SHORTEST_S)
         moved = se3.inverse(self.T_reference_sensor) @ T_reference_sensor
         # what is not known of the pose before may have been part of it
-        doubt = 3 * np.sqrt(np.trace(self.pose_covariance[:3, :3]))
-        speed = max(0.0, float(np.linalg.norm(moved[:3, 3])) - doubt) / seconds
+        margin = 3 * np.sqrt(np.trace(self.pose_covariance[:3, :3]))
+        speed = max(0.0, float(np.linalg.norm(moved[:3, 3])) - margin) / seconds
         if speed > config.max_speed:
             return f'{speed:.1f} m/s is over max_speed {config.max_speed:.1f}'
-        doubt = 3 * np.sqrt(np.trace(self.pose_covariance[3:, 3:]))
-        rate = max(0.0, se3.angle(moved[:3, :3]) - doubt) / seconds
+        margin = 3 * np.sqrt(np.trace(self.pose_covariance[3:, 3:]))
+        rate = max(0.0, se3.angle(moved[:3, :3]) - margin) / seconds
         if rate > config.max_turn_rate:
             return f'{rate:.2f} rad/s is over max_turn_rate {config.max_turn_rate:.2f}'
         return ''

@@ -1,4 +1,4 @@
-"""The way out: what became of one scan (`TrackedScan`)."""
+"""What became of one scan: `State`, `TrackedScan`."""
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -49,7 +49,7 @@ class TrackedScan:
     reference_stamp_ns : int or None
         Stamp of the scan it was registered to.
     keyframe : bool
-        Whether it is the reference of the next scan.
+        Whether it is the reference of the next scan: it has a `keyframe_id` then.
     restarted : bool
         Whether a new track began here.
     warnings : tuple of str
@@ -72,6 +72,9 @@ class TrackedScan:
     confirmed : bool
         Whether the clouds confirmed the motion that was predicted, so that SGOR did not run:
         `registration` comes from `check_prediction`.
+    keyframe_id, reference_id : int or None
+        Ids of this scan and of what it was registered to, among all keyframes of the tracker;
+        None where it is none, and without a step.
     """
 
     stamp_ns: int
@@ -94,3 +97,12 @@ class TrackedScan:
     failures: int = 0
     late: int = 0
     confirmed: bool = False
+    keyframe_id: int | None = None
+    reference_id: int | None = None
+
+
+def without_pose(stamp_ns: int, state: State, reason: str, track_id: int, failures: int, late: int,
+                 warnings: tuple[str, ...] = ()) -> TrackedScan:
+    """Return what became of a scan that was not worked on."""
+    return TrackedScan(stamp_ns, False, reason, None, None, None, None, None, False, False,
+                       warnings, {}, state, track_id, failures=failures, late=late)

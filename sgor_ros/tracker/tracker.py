@@ -1,5 +1,4 @@
 """The way of a scan through the tracker, on one screen."""
-from dataclasses import dataclass
 from dataclasses import replace
 import logging
 
@@ -10,7 +9,6 @@ from ..core.common import se3
 from ..core.common.settings import InputError
 from ..core.config import SgorConfig
 from ..core.prediction_check import check_prediction
-from ..core.prepared_scan import PreparedScan
 from ..core.preprocessing import preprocess
 from ..core.registration import register
 from ..core.scan.scan import SemanticScan
@@ -18,39 +16,27 @@ from ..core.verdict.result import Registration
 from .choice import choose
 from .choice import is_likely
 from .choice import refined
+from .choice import relocalised
 from .choice import Step
 from .choice import UNKNOWN_COVARIANCE
 from .config import TrackerConfig
 from .covariance import PoseCovariance
+from .keyframe_selection import is_keyframe
+from .keyframe_selection import is_new_place
+from .keyframe_selection import overlap
 from .keyframes import Keyframe
 from .keyframes import Keyframes
 from .motion import Motion
 from .result import State
 from .result import TrackedScan
+from .result import without_pose
+from .scan_at_work import ScanAtWork
 from .stamps import Arrival
 from .stamps import Stamps
 
 Array = NDArray[np.float64]
 
 LOGGER = logging.getLogger('sgor_ros')
-
-
-@dataclass(eq=False)
-class _Scan:
-    """The scan at work: what it has become so far."""
-
-    prepared: PreparedScan
-    stamp_ns: int
-    warnings: list[str]
-    timings: dict[str, float]
-    registration: Registration | None = None
-    reference: Keyframe | None = None
-    confirmed: bool = False
-
-    def spent(self, timings: dict[str, float]) -> None:
-        """Add the seconds of stages."""
-        for stage, seconds in timings.items():
-            self.timings[stage] = self.timings.get(stage, 0.0) + seconds
 
 
 class Tracker:
@@ -68,6 +54,7 @@ class Tracker:
         self.tracker_config = TrackerConfig.given(tracker_config)
         self._late = 0
         self._tracks = 0
+        self._ids = 0
         self.reset()
 
     def reset(self) -> None:
@@ -111,16 +98,18 @@ class Tracker:
         prepared = preprocess(
             scan, self.config,
             scale_before=self._reference.prepared.scale if self._reference else None)
-        new = _Scan(prepared, stamp_ns, [*warnings, *prepared.warnings], dict(prepared.timings))
+        new = ScanAtWork(prepared, stamp_ns, [*warnings, *prepared.warnings],
+                         dict(prepared.timings))
         if self._reference is None:
             return self._begin(new)
         step = self._predicted_step(new) or self._step(new, self._reference)
         if isinstance(step, Step):
             # in a new track each new place is a chance to find back to an old track
-            elsewhere = self._is_elsewhere(step.T_reference_sensor)
-            older = self._recognise(new, 1, earlier=True) if elsewhere else None
+            new_place = is_new_place(step.T_reference_sensor, self._reference,
+                                     self._last_keyframe(), self.tracker_config)
+            older = self._relocalise(new, 1, earlier=True) if new_place else None
             return self._accept(new, older or step)
-        other = self._recognise(new, self.tracker_config.retries)
+        other = self._relocalise(new, self.tracker_config.retries)
         return self._fail(new, step) if other is None else self._accept(new, other)
 
     def _forget(self) -> None:
@@ -129,26 +118,25 @@ class Tracker:
         self._motion = Motion.unknown(0, np.eye(4), np.zeros((6, 6)), self.tracker_config)
         self._track_id = self._tracks
         self._failures = 0
-        self._sure = False
+        self._registered = False
 
     def _drop(self, stamp_ns: int) -> TrackedScan:
         self._late += 1
-        return TrackedScan(
-            stamp_ns, False, f'stamp {stamp_ns * 1e-9:.3f} s is not after the last, '
-            f'{(self._stamps.newest_ns or 0) * 1e-9:.3f} s', None, None, None, None, None, False,
-            False, (), {}, State.LATE, self._track_id, failures=self._failures, late=self._late)
+        return without_pose(
+            stamp_ns, State.LATE, f'stamp {stamp_ns * 1e-9:.3f} s is not after the last, '
+            f'{(self._stamps.newest_ns or 0) * 1e-9:.3f} s', self._track_id, self._failures,
+            self._late)
 
     def _fault(self, stamp_ns: int, warnings: list[str], error: Exception) -> TrackedScan:
         """Count a scan that an exception ended as one without a pose."""
         self._failures += 1
         lost = self._failures >= self.tracker_config.max_failures
-        return TrackedScan(
-            stamp_ns, False, f'fault of the program: {type(error).__name__}: {error}', None, None,
-            None, None, None, False, False, tuple(warnings), {},
-            State.LOST if lost else State.FAILED, self._track_id, failures=self._failures,
-            late=self._late)
+        return without_pose(
+            stamp_ns, State.LOST if lost else State.FAILED,
+            f'fault of the program: {type(error).__name__}: {error}', self._track_id,
+            self._failures, self._late, tuple(warnings))
 
-    def _begin(self, new: _Scan) -> TrackedScan:
+    def _begin(self, new: ScanAtWork) -> TrackedScan:
         """Make the scan the origin of a new track, if something can be registered to it."""
         keypoints = len(new.prepared.features.points)
         if keypoints < self.tracker_config.min_keypoints:
@@ -156,35 +144,55 @@ class Tracker:
         self._tracks += 1
         self._track_id = self._tracks
         self._failures = 0
-        self._sure = False
+        self._registered = False
         origin = PoseCovariance.origin()
-        self._reference = Keyframe(new.prepared, new.stamp_ns, self._track_id, np.eye(4), origin)
+        self._reference = self._keyframe(new, np.eye(4), origin)
         self._motion = Motion.unknown(new.stamp_ns, np.eye(4), np.zeros((6, 6)),
                                       self.tracker_config)
         self._keyframes.add(self._reference, self.tracker_config.max_keyframes)
-        return replace(self._result(new, State.NEW_TRACK), success=True, T_odom_sensor=np.eye(4),
-                       covariance=origin.pose, keyframe=True, restarted=True)
+        c = self.tracker_config
+        if c.predict_first and self.config.hypothesis_radius == 0:
+            new.warnings.append('predict_first: SGOR registers every scan all the same, for '
+                                'hypothesis_radius is 0')
+        return replace(
+            new.result(State.NEW_TRACK, self._track_id, self._failures, self._late), success=True,
+            T_odom_sensor=np.eye(4), covariance=origin.pose, keyframe=True,
+            keyframe_id=self._reference.id, restarted=True)
 
-    def _predicted_step(self, new: _Scan) -> Step | None:
+    def _keyframe(self, new: ScanAtWork, T_odom_sensor: Array, covariance: PoseCovariance | None
+                  ) -> Keyframe:
+        """Make a scan one that others can be registered to."""
+        self._ids += 1
+        return Keyframe(self._ids, new.prepared, new.stamp_ns, self._track_id, T_odom_sensor,
+                        covariance)
+
+    def _last_keyframe(self) -> Keyframe | None:
+        return self._keyframes.last(self._track_id)
+
+    def _predicted_step(self, new: ScanAtWork) -> Step | None:
         """Test the predicted motion; return a step if it convinces, and None if SGOR is to run.
 
         That follows a scan that stood for itself, as long as no keyframe is to be made: what all
         later scans are registered to has been found without any prediction.
         """
-        c, motion = self.tracker_config, self._motion_before(new.stamp_ns)
+        c = self.tracker_config
+        motion = self._motion.before(new.stamp_ns, c)
         assert self._reference is not None
         prediction = motion.predict(new.stamp_ns, c)
         T = prediction.T_reference_sensor
-        if not (c.predict_first and self.config.rival_radius > 0 and self._sure
-                and not self._failures and prediction.is_narrow() and self._stays(T)):
+        if not (c.predict_first and self.config.hypothesis_radius > 0 and self._registered
+                and not self._failures and prediction.is_narrow() and self._keeps_keyframe(T)):
             return None
         self._reference = self._reference.ready(self.config)
         if new.prepared.scale != self._reference.prepared.scale:
             return None
-        found = check_prediction(new.prepared, self._reference.prepared, T, self.config)
+        config = self.config
+        if config.min_confidence < c.min_prediction_confidence:
+            config = config.replace(min_confidence=c.min_prediction_confidence)
+        found = check_prediction(new.prepared, self._reference.prepared, T, config)
         new.spent(found.timings)
         if (not found.success or found.T_target_source is None
-                or not self._stays(found.T_target_source, found)
+                or not self._keeps_keyframe(found.T_target_source, found)
                 or not is_likely(found, prediction)):
             return None
         step = Step(found.T_target_source, found.covariance, found.correlated_error)
@@ -193,44 +201,37 @@ class Tracker:
         new.registration, new.reference, new.confirmed = found, self._reference, True
         return step
 
-    def _step(self, new: _Scan, keyframe: Keyframe) -> Step | str:
+    def _keeps_keyframe(self, T_reference_sensor: Array, found: Registration | None = None
+                        ) -> bool:
+        """Whether a scan that was found there makes no new keyframe."""
+        assert self._reference is not None
+        last, c = self._last_keyframe(), self.tracker_config
+        return not (is_new_place(T_reference_sensor, self._reference, last, c)
+                    or is_keyframe(T_reference_sensor, found, self._reference, last, c))
+
+    def _step(self, new: ScanAtWork, keyframe: Keyframe) -> Step | str:
         """Register a scan to a keyframe; return the step to it, or why there is none."""
         keyframe = keyframe.ready(self.config)
         found = register(new.prepared, keyframe.prepared, self.config)
         new.spent(found.timings)
         assert self._reference is not None
-        if keyframe.stamp_ns == self._reference.stamp_ns:
+        motion = self._motion.before(new.stamp_ns, self.tracker_config)
+        if keyframe.id == self._reference.id:
             self._reference = keyframe
-            step = choose(found, self._motion_before(new.stamp_ns), new.stamp_ns,
-                          self.tracker_config, lambda placement: refined(
-                              placement, new.prepared, keyframe.prepared, self.config))
-        elif found.success and found.T_target_source is not None:
-            step = self._distant_step(found, keyframe, new.stamp_ns)
+            step = choose(found, motion, new.stamp_ns, self.tracker_config,
+                          lambda placement: refined(placement, new.prepared, keyframe.prepared,
+                                                    self.config))
         else:
-            step = found.reason
+            T_reference_keyframe = (
+                None if keyframe.track_id != self._track_id else
+                se3.inverse(self._reference.T_odom_sensor) @ keyframe.T_odom_sensor)
+            step = relocalised(found, T_reference_keyframe, motion, new.stamp_ns,
+                               self.tracker_config)
         if new.registration is None or not isinstance(step, str):
             new.registration, new.reference = found, keyframe
         return step
 
-    def _distant_step(self, found: Registration, keyframe: Keyframe, stamp_ns: int
-                      ) -> Step | str:
-        """Return a step to a keyframe that is not the reference, if the sensor can be there."""
-        assert self._reference is not None
-        assert found.T_target_source is not None
-        step = Step(found.T_target_source, found.covariance, found.correlated_error)
-        if keyframe.track_id != self._track_id:
-            return step
-        T = (se3.inverse(self._reference.T_odom_sensor) @ keyframe.T_odom_sensor
-             @ found.T_target_source)
-        return self._motion_before(stamp_ns).impossible(stamp_ns, T, self.tracker_config) or step
-
-    def _motion_before(self, stamp_ns: int) -> Motion:
-        """Return the last motion; where its stamp lay in the future, the place alone."""
-        motion = self._motion
-        return motion if motion.stamp_ns < stamp_ns else Motion.unknown(
-            stamp_ns - 1, motion.T_reference_sensor, motion.pose_covariance, self.tracker_config)
-
-    def _recognise(self, new: _Scan, tries: int, *, earlier: bool = False) -> Step | None:
+    def _relocalise(self, new: ScanAtWork, tries: int, *, earlier: bool = False) -> Step | None:
         """Try other keyframes, or those of earlier tracks; each scan a few, in turns."""
         assert self._reference is not None
         for keyframe in self._keyframes.in_turns(tries, self._reference,
@@ -239,7 +240,7 @@ class Tracker:
                 return step
         return None
 
-    def _accept(self, new: _Scan, step: Step) -> TrackedScan:
+    def _accept(self, new: ScanAtWork, step: Step) -> TrackedScan:
         """Give a registered scan its pose, and decide what the next is registered to."""
         keyframe, T = new.reference, step.T_reference_sensor
         assert keyframe is not None
@@ -250,42 +251,42 @@ class Tracker:
         moving = self._move(new, keyframe, step)
         assert new.registration is not None
         self._reference, self._track_id, self._failures = keyframe, keyframe.track_id, 0
-        self._sure = new.registration.success
+        self._registered = new.registration.success
         T_odom_sensor = keyframe.T_odom_sensor @ T
         covariance = None
         if keyframe.covariance is not None and step.covariance is not None:
             covariance = keyframe.covariance.then(keyframe.T_odom_sensor, T, step.covariance,
                                                   step.correlated_error)
+        state = State.TRACKING if step.fused is None else State.DEGENERATE
         result = replace(
-            self._result(new, State.TRACKING if step.fused is None else State.DEGENERATE),
-            success=True, T_odom_sensor=T_odom_sensor,
+            new.result(state, self._track_id, self._failures, self._late), success=True,
+            T_odom_sensor=T_odom_sensor,
             covariance=None if covariance is None else covariance.pose,
             twist=self._motion.twist if moving else None,
             twist_covariance=(self._motion.twist_covariance
                               if moving and step.covariance is not None else None),
             T_reference_sensor=T, reference_covariance=step.covariance)
         c = self.tracker_config
-        kept = self._makes_keyframe(T, new.registration)
+        kept = is_keyframe(T, new.registration, self._reference, self._last_keyframe(), c)
         if keyframe.first_overlap is None:
-            self._reference = replace(self._reference, first_overlap=_overlap(new.registration))
+            self._reference = replace(self._reference, first_overlap=overlap(new.registration))
         if (len(new.prepared.features.points) < c.min_keypoints
                 or (not kept and c.mode == 'keyframe')):
             return result
-        self._reference = Keyframe(new.prepared, new.stamp_ns, self._track_id, T_odom_sensor,
-                                   covariance)
+        self._reference = self._keyframe(new, T_odom_sensor, covariance)
         self._motion = self._motion.at_new_reference()
         if kept:
             self._keyframes.add(self._reference, self.tracker_config.max_keyframes)
-        return replace(result, keyframe=True)
+        return replace(result, keyframe=True, keyframe_id=self._reference.id)
 
-    def _move(self, new: _Scan, keyframe: Keyframe, step: Step) -> bool:
+    def _move(self, new: ScanAtWork, keyframe: Keyframe, step: Step) -> bool:
         """Take in the motion of a step; return whether the velocity is known."""
         assert self._reference is not None
         covariance = UNKNOWN_COVARIANCE if step.covariance is None else step.covariance
         before = self._motion
         if step.fused is not None:
             self._motion = step.fused
-        elif (keyframe.stamp_ns == self._reference.stamp_ns and before.stamp_ns < new.stamp_ns
+        elif (keyframe.id == self._reference.id and before.stamp_ns < new.stamp_ns
               and self._failures < self.tracker_config.max_failures):
             self._motion = before.measured(new.stamp_ns, step.T_reference_sensor, covariance)
         else:
@@ -294,7 +295,7 @@ class Tracker:
             return False
         return True
 
-    def _fail(self, new: _Scan, reason: str) -> TrackedScan:
+    def _fail(self, new: ScanAtWork, reason: str) -> TrackedScan:
         """Give no pose; the keyframes stay, until after long a new track begins."""
         config = self.tracker_config
         self._failures += 1
@@ -307,45 +308,5 @@ class Tracker:
             return self._begin(new)
         if self._failures == config.max_failures:
             new.warnings.append(f'{self._failures} scans in a row without a pose: lost')
-        return replace(self._result(new, State.LOST if lost else State.FAILED), reason=reason)
-
-    def _result(self, new: _Scan, state: State) -> TrackedScan:
-        """Return what is known of a scan before it has a pose."""
-        return TrackedScan(
-            new.stamp_ns, False, '', None, None, None, new.registration,
-            None if new.reference is None else new.reference.stamp_ns, False, False,
-            tuple(new.warnings), new.timings, state, self._track_id, failures=self._failures,
-            late=self._late, confirmed=new.confirmed)
-
-    def _makes_keyframe(self, T_reference_sensor: Array, found: Registration | None = None
-                        ) -> bool:
-        """Whether a scan that was found there is to be remembered."""
-        assert self._reference is not None
-        c, first = self.tracker_config, self._reference.first_overlap
-        if c.mode == 'consecutive':
-            return self._is_elsewhere(T_reference_sensor)
-        return _is_far(T_reference_sensor, c) or (
-            found is not None and first is not None
-            and _overlap(found) < c.keyframe_overlap * first)
-
-    def _stays(self, T_reference_sensor: Array, found: Registration | None = None) -> bool:
-        """Whether a scan that was found there changes nothing of the keyframes."""
-        return not (self._is_elsewhere(T_reference_sensor)
-                    or self._makes_keyframe(T_reference_sensor, found))
-
-    def _is_elsewhere(self, T_reference_sensor: Array) -> bool:
-        """Whether a scan is far from the newest keyframe that is remembered of this track."""
-        last = self._keyframes.last(self._track_id)
-        assert self._reference is not None
-        return last is None or _is_far(
-            se3.inverse(last.T_odom_sensor) @ self._reference.T_odom_sensor @ T_reference_sensor,
-            self.tracker_config)
-
-
-def _overlap(found: Registration) -> float:
-    return 0.0 if found.score is None else found.score.overlap
-
-
-def _is_far(T: Array, config: TrackerConfig) -> bool:
-    return (float(np.linalg.norm(T[:3, 3])) > config.keyframe_distance
-            or se3.angle(T[:3, :3]) > config.keyframe_angle)
+        return replace(new.result(State.LOST if lost else State.FAILED, self._track_id,
+                                  self._failures, self._late), reason=reason)

@@ -145,13 +145,31 @@ def test_missing_and_unreadable_files(pair, tmp_path, capsys):
     assert '3 bytes are no points' in capsys.readouterr().err
 
 
+def test_settings_for_studies_and_names_of_before_are_taken_and_not_shown(pair, tmp_path, capsys):
+    """In options and in files; the shorter help is for those who do not study the method."""
+    with pytest.raises(SystemExit):
+        main(['--help'])
+    shown = capsys.readouterr().out
+    for name in ('ground-check', 'groups', 'quick-keypoints', 'rival-radius'):
+        assert f'--{name}' not in shown
+    assert '--hypothesis-radius' in shown
+    file = tmp_path / 'params.yaml'
+    file.write_text('/**:\n  ros__parameters:\n    group_keep: 3\n    group_size: 3\n')
+    assert main([*pair[:2], '--params-file', str(file)]) == 2
+    assert 'group_keep = 3: not below group_size = 3' in capsys.readouterr().err
+    assert main([*pair[:2], '--group-keep', '2000']) == 2
+    assert 'group_keep = 2000' in capsys.readouterr().err
+    assert main([*pair[:2], '--rival-radius', '-1']) == 2
+    assert 'hypothesis_radius = -1.0' in capsys.readouterr().err
+
+
 def test_help_tells_units_bounds_and_defaults(capsys):
     with pytest.raises(SystemExit, match='0'):
         main(['--help'])
     said = ' '.join(capsys.readouterr().out.split())
     assert ('--sigma-d m Two correspondences are consistent when their lengths differ by less '
             f'[m]; at least 0.005, at most 5, default {SgorConfig().sigma_d:g}') in said
-    assert '--no-local-refinement' in said
+    assert '--hypothesis-radius m' in said
 
 
 def test_real_pair_with_two_label_conventions(data_folder, tmp_path):

@@ -10,10 +10,10 @@ from sgor_ros import preprocess
 from sgor_ros import register
 from sgor_ros import SemanticScan
 from sgor_ros import SgorConfig
+from sgor_ros import Status
 from sgor_ros.commands.scene_pairs import scene_drive
 from sgor_ros.core.common import se3
 from sgor_ros.core.prediction_check import check_prediction
-from sgor_ros.core.verdict.result import Status
 
 CONFIG = SgorConfig()
 
@@ -60,12 +60,15 @@ def test_what_is_wrong_is_not_confirmed(pair, offset):
 
 
 def test_a_scan_of_another_place_is_not_confirmed(pair, elsewhere):
-    """Even where any confidence is accepted: then `register` is to say."""
+    """Even where any confidence is accepted."""
     _, target, truth = pair
     other = preprocess(SemanticScan(*elsewhere[0][:2]), CONFIG)
     found = check_prediction(other, target, truth, CONFIG.replace(min_confidence=0.0))
     assert found.status is Status.REFUSED
-    assert 'min_confidence' in found.reason
+    assert found.reason
+    refused = check_prediction(other, target, truth, CONFIG)
+    assert refused.status is Status.REFUSED
+    assert 'min_confidence 0.85' in refused.reason
 
 
 @pytest.mark.parametrize('kind', ['tunnel', 'tunnel_lamps_12', 'corridor', 'facade'])
@@ -82,8 +85,8 @@ def test_where_scans_slide_or_repeat_nothing_is_confirmed(kind):
 
 def test_without_rivals_nothing_is_confirmed(pair):
     source, target, truth = pair
-    with pytest.raises(InputError, match='rival_radius = 0'):
-        check_prediction(source, target, truth, CONFIG.replace(rival_radius=0.0))
+    with pytest.raises(InputError, match='hypothesis_radius = 0'):
+        check_prediction(source, target, truth, CONFIG.replace(hypothesis_radius=0.0))
 
 
 def test_scans_of_different_scales_are_not_compared(pair):

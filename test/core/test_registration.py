@@ -5,11 +5,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from sgor_ros import InputError
 from sgor_ros import preprocess
 from sgor_ros import register
 from sgor_ros import SemanticScan
 from sgor_ros import SgorConfig
-from sgor_ros.core.verdict.result import Status
+from sgor_ros import Status
+from sgor_ros.core.config import PREPARATION
 
 
 @pytest.fixture(scope='module')
@@ -328,3 +330,45 @@ def test_scans_of_next_to_nothing_are_refused(prepared, points):
     little = SemanticScan(points, np.full(len(points), 50))
     for source, target in ((little, prepared[0]), (prepared[0], little), (little, little)):
         assert_refused(register(source, target))
+
+
+def other_preparations():
+    """Yield each setting that scans are prepared with, and another value of it."""
+    for name in PREPARATION:
+        value = getattr(SgorConfig(), name)
+        if name != 'label_convention':    # labels are classes by then
+            yield name, {bool: lambda v: not v, int: lambda v: v - 10, float: lambda v: v * 0.9,
+                         str: lambda v: 'point'}[type(value)](value)
+
+
+@pytest.mark.parametrize(('name', 'value'), list(other_preparations()))
+def test_a_scan_that_was_prepared_otherwise_is_refused_by_name(prepared, name, value):
+    before = getattr(SgorConfig(), name)
+    with pytest.raises(InputError) as caught:
+        register(prepared[1], prepared[0], SgorConfig(**{name: value}))
+    assert str(caught.value) == (
+        f'source: prepared with {name} = {before!r}, not with {value!r}; preprocess it with the '
+        'configuration of the registration')
+
+
+def test_one_scan_that_was_prepared_otherwise_is_named(prepared, scans):
+    other = preprocess(scans[1], SgorConfig(voxel_size=0.4))
+    with pytest.raises(InputError, match=r'^target: prepared with voxel_size = 0\.4, not with'):
+        register(prepared[0], other)
+    with pytest.raises(InputError, match=r'^source: prepared at scale 1, not at 0\.5'):
+        register(prepared[1], prepared[0], SgorConfig(scale=0.5))
+
+
+def test_what_only_registration_asks_may_change(prepared):
+    changed = SgorConfig(min_confidence=0.5, hypothesis_radius=20.0, quick_keypoints=0, threads=1)
+    assert register(prepared[1], prepared[0], changed).success
+
+
+def test_prepared_scans_bring_their_configuration(scans):
+    """Without one, theirs counts: not the default."""
+    config = SgorConfig(voxel_size=0.6, min_confidence=1.0)
+    source, target = preprocess(scans[1], config), preprocess(scans[0], config)
+    for found in (register(source, target), register(scans[1], target)):
+        assert found.status is Status.REFUSED
+        assert 'min_confidence 1.00' in found.reason
+    assert register(source, target, config.replace(min_confidence=0.85)).success

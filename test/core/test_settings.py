@@ -7,7 +7,11 @@ import pytest
 from sgor_ros import InputError
 from sgor_ros import SgorConfig
 from sgor_ros import TrackerConfig
+from sgor_ros.core.ablation import Ablation
 from sgor_ros.core.config import PAPER_STEPS
+from sgor_ros.core.config import PREPARATION
+from sgor_ros.core.config import prepares_alike
+from sgor_ros.tracker.config import TrackerAblation
 
 FIELDS = [(kind, item) for kind in (SgorConfig, TrackerConfig) for item in kind.settings()]
 NUMBERS = [pytest.param(kind, item, id=item.name) for kind, item in FIELDS
@@ -187,3 +191,53 @@ def test_an_error_is_one_line_that_a_terminal_shows():
     error = InputError('field \x1b[2J\x00: broken\n    in line 2\n')
     assert str(error) == r'field \x1b[2J\x00: broken in line 2'
     assert str(InputError('Grüße, 5 °')) == 'Grüße, 5 °'
+
+
+def test_users_see_a_dozen_settings_and_the_rest_is_for_studies():
+    """Each in a group; what is not shown is a field all the same, taken by name."""
+    shown = SgorConfig.shown()
+    assert [item.name for item in shown] == [
+        'scale', 'label_convention', 'min_range', 'max_range', 'voxel_size', 'sigma_g', 'sigma_d',
+        'sigma_theta', 'tau_1', 'min_confidence', 'hypothesis_radius', 'max_correspondences',
+        'max_voxels', 'threads']
+    assert list(dict.fromkeys(item.group for item in shown)) == [
+        'space', 'sensor', 'thresholds', 'trust', 'speed']
+    assert {*SgorConfig.settings()} == {*shown, *Ablation.settings()}
+    assert {*TrackerConfig.settings()} == {*TrackerConfig.shown(), *TrackerAblation.settings()}
+    assert SgorConfig(ground_check=False).ground_check is False
+    assert TrackerConfig(predict_first=False).predict_first is False
+
+
+RENAMED = {'rival_radius': 'hypothesis_radius', 'evidence_reach': 'max_correspondence_distance',
+           'local_reach': 'gicp_max_correspondence_distance'}
+
+
+@pytest.mark.parametrize(('old', 'new'), RENAMED.items())
+def test_names_of_before_are_taken_with_a_warning(old, new):
+    value = 0.7 if old != 'rival_radius' else 12.0
+    for build in (SgorConfig, lambda **values: SgorConfig.from_values(values),
+                  lambda **values: SgorConfig().replace(**values)):
+        with pytest.warns(DeprecationWarning, match=f'{old} is {new} now'):
+            config = build(**{old: value})
+        assert config == SgorConfig(**{new: value})
+        with pytest.warns(DeprecationWarning, match=f'{old} is {new} now'):
+            assert getattr(config, old) == value
+
+
+# another value of each setting that is not the default, and goes with the others
+CHANGES = {name: not value if isinstance(value, bool) else value * 0.9
+           for name in PREPARATION
+           if isinstance(value := getattr(SgorConfig(), name), bool | float)}
+CHANGES |= {'max_voxels': 30000, 'min_ground_points': 40, 'drop_ground_labels': 'point',
+            'label_convention': 'nuscenes', 'scale': 0.5}
+
+
+def test_what_a_scan_was_prepared_with_is_asked():
+    assert {*CHANGES} == {*PREPARATION, 'scale'}
+    for name, value in CHANGES.items():
+        assert not prepares_alike(SgorConfig(), SgorConfig(**{name: value})), name
+    for name in ({item.name for item in SgorConfig.settings()} - {*PREPARATION, 'scale'}):
+        value = getattr(SgorConfig(), name)
+        other = {bool: lambda v: not v, int: lambda v: v + 1, str: lambda v: 'hard',
+                 float: lambda v: v * 1.1 if v >= 1 else v * 0.9}[type(value)](value)
+        assert prepares_alike(SgorConfig(), SgorConfig(**{name: other})), name

@@ -93,7 +93,7 @@ def _label_table(path):
 def _parameters(path):
     with redirect_stderr(io.StringIO()):
         arguments = Namespace(params_file=path)
-        found = read_parameters(arguments, SgorConfig.settings())
+        found = read_parameters(arguments, SgorConfig)
         configured(SgorConfig(), arguments, found)
 
 

@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 from rcl_interfaces.msg import Parameter as ParameterMessage
 from rcl_interfaces.srv import DescribeParameters
+from rcl_interfaces.srv import GetParameters
+from rcl_interfaces.srv import ListParameters
 from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
 from rclpy.qos import ReliabilityPolicy
@@ -24,8 +26,8 @@ from sgor_ros import TrackerConfig
 from sgor_ros.io.messages import matrix_of
 from sgor_ros.ros.parameters import NodeConfig
 from sgor_ros.ros.parameters import yaml_files
-from sgor_ros.ros.player import NodeProcess
-from sgor_ros.ros.player import SETTLING_S
+from sgor_ros.ros.playback.node_process import NodeProcess
+from sgor_ros.ros.playback.player import SETTLING_S
 from sgor_ros.ros.types import ros_type
 from sgor_ros.world import Lidar
 from sgor_ros.world import simulate
@@ -36,6 +38,7 @@ SECOND = 1_000_000_000
 SMALL = Lidar(beams=32, columns=600)
 TOLERANCE_M, TOLERANCE_RAD = 0.15, 0.02
 FLOAT32, FLOAT64 = 7, 8
+STUDIED = {'predict_first': 'true', 'groups': 500, 'semantics': 'loose', 'normal_radius': 1.5}
 
 
 @pytest.fixture(scope='module')
@@ -47,7 +50,10 @@ def street():
 
 @pytest.fixture(scope='module')
 def shared_node(domain, tmp_path_factory):
-    node = NodeProcess(domain, tmp_path_factory.mktemp('node') / 'log')
+    # settings for studies are parameters only where they are given
+    studies = [f'{name}:={value}' for name, value in STUDIED.items()]
+    node = NodeProcess(domain, tmp_path_factory.mktemp('node') / 'log',
+                       *(part for each in studies for part in ('-p', each)))
     yield node
     node.stop()
 
@@ -209,7 +215,7 @@ def test_a_refused_parameter_says_why(partner, name, value, words):
 
 def test_parameters_carry_meaning_unit_and_range(partner):
     settings = {item.name: item for config in (SgorConfig, TrackerConfig, NodeConfig)
-                for item in config.settings()}
+                for item in config.shown()}
     answer = partner.call(DescribeParameters, '/sgor_node/describe_parameters',
                           DescribeParameters.Request(names=list(settings)))
     for descriptor, item in zip(answer.descriptors, settings.values(), strict=True):
@@ -218,6 +224,29 @@ def test_parameters_carry_meaning_unit_and_range(partner):
         assert [(x.from_value, x.to_value) for x in limits] == (
             [] if item.minimum is None else [(item.minimum, item.maximum)])
         assert descriptor.read_only == (item.name in NodeConfig.__dataclass_fields__)
+
+
+def test_settings_for_studies_are_parameters_only_where_they_are_given(partner):
+    names = partner.call(ListParameters, '/sgor_node/list_parameters',
+                         ListParameters.Request()).result.names
+    studies = {item.name for config in (SgorConfig, TrackerConfig)
+               for item in {*config.settings()} - {*config.shown()}}
+    assert studies & {*names} == {*STUDIED}
+
+
+def test_names_of_before_and_misspelt_ones_are_told(domain, tmp_path):
+    arguments = ('-p', 'rival_radius:=12.0', '-p', 'hypothesis_radios:=3.0')
+    with NodeProcess(domain, tmp_path / 'log', *arguments, '-r', '__node:=renamed') as node:
+        partner = ros.Partner(domain)
+        answer = partner.call(GetParameters, '/renamed/get_parameters', GetParameters.Request(
+            names=['hypothesis_radius']))
+        partner.close()
+        assert node.stop() == 0
+    assert answer.values[0].double_value == 12.0
+    told = node.log.read_text()
+    assert 'parameter rival_radius: it is hypothesis_radius now' in told
+    assert 'parameter hypothesis_radios: there is none of that name' in told
+    assert 'parameter rival_radius: there is none' not in told
 
 
 def without_label(cloud):
@@ -485,7 +514,7 @@ def test_a_reliable_only_node_says_what_it_cannot_hear(domain, tmp_path):
                                           reason='tf2_msgs is installed')),
 ])
 def test_what_cannot_work_ends_the_start_with_a_message(domain, argument, words):
-    ran = subprocess.run([sys.executable, '-m', 'sgor_ros.ros.node', '--ros-args', '-p', argument],
+    ran = subprocess.run([sys.executable, '-m', 'sgor_ros.ros.main', '--ros-args', '-p', argument],
                          env=domain.environment(), cwd=ROOT, capture_output=True, text=True,
                          timeout=60)
     assert ran.returncode == 2

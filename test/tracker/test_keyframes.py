@@ -9,7 +9,7 @@ from sgor_ros.tracker.keyframes import Keyframes
 def keyframe(stamp_ns, x=0.0, track_id=1):
     """Return one at a place; whoever holds it needs no scan."""
     T = se3.compose(np.eye(3), np.array([x, 0.0, 0.0]))
-    return Keyframe(None, stamp_ns, track_id, T, None)
+    return Keyframe(stamp_ns, None, stamp_ns, track_id, T, None)
 
 
 def along(count, limit):

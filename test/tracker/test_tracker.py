@@ -12,6 +12,7 @@ from sgor_ros import Tracker
 from sgor_ros import TrackerConfig
 from sgor_ros.core.common import se3
 from sgor_ros.io.datasets import open_drives
+from sgor_ros.tracker import keyframes as keyframes_module
 
 PERIOD_NS = 100_000_000
 MODES = ('consecutive', 'keyframe')
@@ -366,3 +367,47 @@ def test_dropouts_of_the_segmentation_leave_no_mark(scans, street, mode, out):
     for i, result in enumerate(track(dropped, mode=mode)):
         assert result.success, result.reason
         assert_near(result.T_odom_sensor, relative(street[0][2], street[i][2]))
+
+
+def test_a_threshold_prepares_no_keyframe_again(scans, monkeypatch):
+    """What a scan was not prepared with may change at every scan."""
+    tracker = Tracker()
+    track(scans[:2], tracker)
+    again = []
+    monkeypatch.setattr(keyframes_module, 'preprocess', lambda *_, **__: again.append(1))
+    tracker.config = tracker.config.replace(min_confidence=0.86, hypothesis_radius=25.0)
+    assert tracker.track(scans[2], 2 * PERIOD_NS).success
+    assert not again
+
+
+def test_keyframes_have_ids_of_their_own(scans):
+    """Also where time goes back and stamps come twice."""
+    tracker = Tracker(tracker_config=TrackerConfig(mode='consecutive'))
+    first = track(scans[:3], tracker, stamps=[10 * PERIOD_NS, 11 * PERIOD_NS, 12 * PERIOD_NS])
+    assert [r.keyframe_id for r in first] == [1, 2, 3]
+    assert [r.reference_id for r in first] == [None, 1, 2]
+    tracker.reset()
+    again = track(scans[:3], tracker, stamps=[10 * PERIOD_NS, 11 * PERIOD_NS, 12 * PERIOD_NS])
+    assert [r.keyframe_id for r in again] == [4, 5, 6]
+    assert [r.reference_id for r in again] == [None, 4, 5]
+    few = track(scans[:3], mode='keyframe', keyframe_distance=50.0)
+    assert [r.keyframe_id for r in few] == [1, None, None]
+    assert [r.reference_id for r in few] == [None, 1, 1]
+
+
+def test_a_prediction_needs_competing_hypotheses_and_says_so(scans):
+    results = track(scans[:4], Tracker(SgorConfig(hypothesis_radius=0.0)))
+    assert not any(r.confirmed for r in results)
+    assert any('hypothesis_radius is 0' in text for text in results[0].warnings)
+    assert not any('hypothesis_radius' in text for r in results[1:] for text in r.warnings)
+    assert not track(scans[:1])[0].warnings
+
+
+def test_a_prediction_is_believed_from_a_confidence_of_its_own(scans):
+    """Whoever accepts any answer of SGOR still hears of other ones."""
+    believed = track(scans, Tracker(SgorConfig(min_confidence=0.0)))
+    assert any(r.confirmed for r in believed)
+    never = track(scans, Tracker(SgorConfig(min_confidence=0.0), TrackerConfig(
+        min_prediction_confidence=1.0)))
+    assert not any(r.confirmed for r in never)
+    assert all(r.success for r in never)

@@ -1,12 +1,16 @@
 """What every configuration of this package is made of: one typed, bounded, documented field."""
+from collections.abc import Callable
 import dataclasses
 from dataclasses import dataclass
 from dataclasses import field
+from functools import wraps
 import math
 import re
 from typing import Any
 from typing import cast
+from typing import ClassVar
 from typing import Self
+import warnings
 
 import numpy as np
 
@@ -25,7 +29,7 @@ class InputError(ValueError):
 
 
 def setting(default: Value, meaning: str, unit: str = '', *, minimum: float | None = None,
-            maximum: float | None = None, choices: tuple[str, ...] = ()) -> Any:
+            maximum: float | None = None, choices: tuple[str, ...] = (), group: str = '') -> Any:
     """Return a dataclass field that carries its unit, meaning and bounds.
 
     Parameters
@@ -39,9 +43,11 @@ def setting(default: Value, meaning: str, unit: str = '', *, minimum: float | No
         Bounds, both inclusive.
     choices : tuple of str
         The words that a string may be; empty for any.
+    group : str
+        Heading under which shells show it.
     """
     metadata = {'meaning': meaning, 'unit': unit, 'minimum': minimum, 'maximum': maximum,
-                'choices': choices}
+                'choices': choices, 'group': group}
     return field(default=default, metadata=metadata)
 
 
@@ -56,6 +62,7 @@ class Setting:
     minimum: float | None
     maximum: float | None
     choices: tuple[str, ...]
+    group: str
 
     @property
     def kind(self) -> type:
@@ -98,6 +105,11 @@ class Setting:
 class Settings:
     """Base of the frozen configurations: checks each value when it is built."""
 
+    FOR_STUDIES: ClassVar[bool] = False
+    """Whether shells leave out the fields of this class, which subclasses inherit."""
+    RENAMED: ClassVar[dict[str, str]] = {}
+    """Names that fields had before, which are still taken: see `renamed`."""
+
     def __post_init__(self) -> None:
         for item in self.settings():
             object.__setattr__(self, item.name, item.check(getattr(self, item.name)))
@@ -107,6 +119,23 @@ class Settings:
         """Return the fields in their order, with defaults, units and bounds."""
         return tuple(Setting(f.name, cast(Value, f.default), **f.metadata)
                      for f in dataclasses.fields(cls))
+
+    @classmethod
+    def shown(cls) -> tuple[Setting, ...]:
+        """Return the fields that users see in nodes, parameter files and ``--help``."""
+        hidden = {item.name for base in cls.__mro__
+                  if issubclass(base, Settings) and vars(base).get('FOR_STUDIES')
+                  for item in base.settings()}
+        return tuple(item for item in cls.settings() if item.name not in hidden)
+
+    @classmethod
+    def current(cls, values: dict[str, Any]) -> dict[str, Any]:
+        """Return values by the names of today; those of before are taken with a warning."""
+        found = {name: value for name, value in values.items() if name not in cls.RENAMED}
+        for name in values.keys() - found.keys():
+            warnings.warn(f'{name} is {cls.RENAMED[name]} now', DeprecationWarning, stacklevel=4)
+            found[cls.RENAMED[name]] = values[name]
+        return found
 
     @classmethod
     def given(cls, config: Self | None) -> Self:
@@ -133,6 +162,7 @@ class Settings:
         InputError
             Unknown name, or a refused value.
         """
+        values = cls.current(values)
         names = [item.name for item in cls.settings()]
         for name in values:
             if name not in names:
@@ -141,4 +171,29 @@ class Settings:
 
     def replace(self, **values: Any) -> Self:
         """Return a copy with some values changed and everything checked again."""
-        return type(self).from_values({**dataclasses.asdict(self), **values})
+        return type(self).from_values({**dataclasses.asdict(self), **self.current(values)})
+
+
+def _renamed_to(old: str, new: str) -> Callable[[Settings], Value]:
+    def value(self: Settings) -> Value:
+        warnings.warn(f'{old} is {new} now', DeprecationWarning, stacklevel=2)
+        return cast(Value, getattr(self, new))
+    return value
+
+
+def renamed[Config: type[Settings]](**names: str) -> Callable[[Config], Config]:
+    """Let a configuration take and tell fields by the names that they had before, old to new."""
+    def decorate(cls: Config) -> Config:
+        build: Any = cls.__init__
+
+        @wraps(build)
+        def init(self: Settings, *args: Any, **values: Any) -> None:
+            build(self, *args, **cls.current(values))
+
+        named: Any = cls
+        named.RENAMED, named.__init__ = names, init
+        for old, new in names.items():
+            setattr(cls, old, property(_renamed_to(old, new)))
+        return cls
+
+    return decorate

@@ -87,11 +87,11 @@ def independent(degenerate: tuple[DegenerateDirection, ...]) -> Array:
 
 
 def in_words(degenerate: tuple[DegenerateDirection, ...]) -> str:
-    """Say how the clouds slide."""
-    said = []
+    """Describe the directions for a person."""
+    parts = []
     for direction in degenerate:
         part, way = ((slice(0, 3), 'slide along') if is_shift(direction.twist)
                      else (slice(3, 6), 'turn about'))
         x, y, z = direction.twist[part] / np.linalg.norm(direction.twist[part])
-        said.append(f'{way} ({x:.2f}, {y:.2f}, {z:.2f})')
-    return 'degenerate: the clouds ' + ' and '.join(said)
+        parts.append(f'{way} ({x:.2f}, {y:.2f}, {z:.2f})')
+    return 'degenerate: the clouds ' + ' and '.join(parts)

@@ -1,7 +1,7 @@
-"""Perturbation test: a pose is pushed along a weak direction, fitted again, and asked once more.
+"""Perturbation test: a pose is pushed along a weak direction, fitted again, and scored once more.
 
-The direction is degenerate where the clouds neither slide back nor mind. How far they can be
-pushed is how little is known.
+The direction is degenerate where ICP does not bring the pose back and its score does not rule it
+out. How far it can be pushed is how little is known.
 """
 import numpy as np
 from numpy.typing import NDArray

@@ -1,4 +1,4 @@
-"""What is made when it is first asked for."""
+"""Lazy values: made when they are first asked for."""
 from collections.abc import Callable
 from threading import Lock
 

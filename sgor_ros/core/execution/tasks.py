@@ -11,7 +11,7 @@ def run_both[A, B](threads: int, one: Callable[[], A], other: Callable[[], B]) -
     second: list[B] = []
 
     def run(begin: int, end: int) -> None:
-        # what is allowed is said anew: each thread of the pool has a limit of its own
+        # each thread of the pool has a limit of its own
         with cores(max(threads // 2, 1)):
             if begin == 0:
                 first.append(one())

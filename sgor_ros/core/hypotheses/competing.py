@@ -7,7 +7,8 @@ among the hypotheses of the solver, and step by step along weak directions. Each
 and scored at the same keypoints.
 
 A competing pose is ruled out by free space: where it lays points into what the other sensor has
-looked through, and the answer does not. What every pose explains, walls and road, says nothing.
+looked through, and the answer does not. What every pose explains, walls and road, tells none
+apart.
 """
 from dataclasses import dataclass
 from dataclasses import replace
@@ -79,16 +80,16 @@ class HypothesisTest:
 
 def compete(source: ScanIndex, target: ScanIndex, T_target_source: Array, hypotheses: Array,
             config: SgorConfig) -> HypothesisTest:
-    """Test a pose against others, or score it alone where `rival_radius` is 0.
+    """Test a pose against others, or score it alone where `hypothesis_radius` is 0.
 
     One that scores too low gets more rounds of ICP: none is refused for a fit on its way.
     """
-    if config.rival_radius == 0:
+    if config.hypothesis_radius == 0:
         return alone(source, target, T_target_source)
     if not config.ground_check:
         # what is up may be a wall here, and there the ceiling
         source, target = replace(source, level=False), replace(target, level=False)
-    found = hypothesis_test(source, target, T_target_source, hypotheses, config.rival_radius)
+    found = hypothesis_test(source, target, T_target_source, hypotheses, config.hypothesis_radius)
     if pose_score(found.outcomes).confidence >= config.min_confidence:
         return found
     T = icp(source, target, found.T_target_source[None], LATE, LATE)

@@ -50,7 +50,7 @@ def search_weak_directions(source: ScanIndex, target: ScanIndex, T: NDArray[np.f
 
 
 def _score(outcomes: NDArray[np.int8]) -> NDArray[np.float64]:
-    """Return what speaks for each row of (K, n) outcomes, (K,)."""
+    """Return agreements less weighted violations of each row of (K, n) outcomes, (K,)."""
     score: NDArray[np.float64] = ((outcomes == AGREES).sum(axis=1)
                                   - VIOLATION_WEIGHT * (outcomes == VIOLATES).sum(axis=1))
     return score

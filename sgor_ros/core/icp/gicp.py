@@ -14,6 +14,8 @@ from .covariance import correlated_error
 from .covariance import correlated_part
 from .covariance import noise
 from .covariance import scattered
+from .normal_equations import add_pair
+from .normal_equations import TERMS
 
 FLAT = 0.999
 """How much less a point errs across its surface than along it, in variance (GICP)."""
@@ -53,22 +55,22 @@ class Alignment:
 
 def align(source: Surface, target: Surface, T_target_source: NDArray[np.float64],
           config: SgorConfig) -> Alignment:
-    """Refine a transformation by GICP, from within `local_reach`.
+    """Refine a transformation by GICP, from within `gicp_max_correspondence_distance`.
 
     As small_gicp does it, by Gauss-Newton and with normals in place of covariances.
     """
     T = np.array(T_target_source, np.float64, order='C')
     here, there = source.columns, target.columns
-    sums = np.empty((BLOCKS, 29))
+    sums = np.empty((BLOCKS, TERMS + 2))    # and error and pairs
     converged = False
     for _ in range(ROUNDS):
         parallel_for(_sum_up, BLOCKS, here.points, source.normals, T, there.points,
                      target.normals, there.first, there.ny, there.low, there.edge,
-                     config.local_reach, sums)
+                     config.gicp_max_correspondence_distance, sums)
         total = sums.sum(axis=0)
         information = np.empty((6, 6))
         information[LOWER] = information.T[LOWER] = total[:21]
-        pairs, error = int(total[28]), float(total[27])
+        error, pairs = float(total[TERMS]), int(total[TERMS + 1])
         step = -np.linalg.solve(information + DAMPING * np.eye(6), total[21:27])
         T = se3.perturbed(T, step)
         converged = bool(np.linalg.norm(step[:3]) < STILL_M and np.linalg.norm(step[3:])
@@ -102,10 +104,7 @@ def _nearest(x, y, z, points, first, ny, low, edge, reach):
 @numba.njit(cache=True, nogil=True)
 def _sum_up(begin, end, points, normals, T, others, other_normals,
             first, ny, low, edge, reach, sums):
-    """Sum up the information of each block (21: lower triangle), its gradient (6), error, pairs.
-
-    Of the perturbation (translation, rotation about the source's origin) in the target frame.
-    """
+    """Sum up the normal equations of each block, its error and its pairs."""
     for block in range(begin, end):
         total = sums[block]
         total[:] = 0.0
@@ -135,26 +134,7 @@ def _sum_up(begin, end, points, normals, T, others, other_normals,
             scale = 1.0 / (cxx * ixx + cxy * ixy + cxz * ixz)
             ixx, ixy, ixz, iyy, iyz, izz = (ixx * scale, ixy * scale, ixz * scale, iyy * scale,
                                             iyz * scale, izz * scale)
-            # rows of the mixed part: arm x row of the information
-            rxx, rxy, rxz = _cross(ax, ay, az, ixx, ixy, ixz)
-            ryx, ryy, ryz = _cross(ax, ay, az, ixy, iyy, iyz)
-            rzx, rzy, rzz = _cross(ax, ay, az, ixz, iyz, izz)
-            # of the rotation: arm x column of the mixed part
-            wxx, wyx, wzx = _cross(ax, ay, az, rxx, ryx, rzx)
-            _, wyy, wzy = _cross(ax, ay, az, rxy, ryy, rzy)
-            _, _, wzz = _cross(ax, ay, az, rxz, ryz, rzz)
             ex, ey, ez = x - others[j, 0], y - others[j, 1], z - others[j, 2]
-            gx = ixx * ex + ixy * ey + ixz * ez
-            gy = ixy * ex + iyy * ey + iyz * ez
-            gz = ixz * ex + iyz * ey + izz * ez
-            tx, ty, tz = _cross(ax, ay, az, gx, gy, gz)
-            for k, value in enumerate((
-                    ixx, ixy, iyy, ixz, iyz, izz, rxx, ryx, rzx, wxx, rxy, ryy, rzy, wyx, wyy,
-                    rxz, ryz, rzz, wzx, wzy, wzz, gx, gy, gz, tx, ty, tz,
-                    0.5 * (gx * ex + gy * ey + gz * ez), 1.0)):
-                total[k] += value
-
-
-@numba.njit(cache=True, nogil=True, inline='always')
-def _cross(ax, ay, az, bx, by, bz):
-    return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+            gx, gy, gz = add_pair(total, ax, ay, az, ixx, ixy, ixz, iyy, iyz, izz, ex, ey, ez)
+            total[TERMS] += 0.5 * (gx * ex + gy * ey + gz * ez)
+            total[TERMS + 1] += 1.0

@@ -17,6 +17,8 @@ from ..scoring.pose_scoring import alike
 from ..scoring.pose_scoring import gap
 from ..scoring.pose_scoring import ON_SURFACE
 from ..scoring.pose_scoring import TANGENTIAL
+from .normal_equations import add_pair
+from .normal_equations import TERMS
 
 KEYPOINTS = 300
 """Keypoints of the source that are fitted, where nothing else is asked for."""
@@ -92,15 +94,11 @@ def _nearest(x, y, z, label, others, normals, other_labels, columns, width, low,
 @numba.njit(cache=True, nogil=True, error_model='numpy')
 def _icp(first, last, points, labels, T, others, normals, other_labels,
          columns, width, low, edge, reach, wide, narrow):
-    H, g = np.empty((6, 6), np.float64), np.empty(6, np.float64)
-    # normal, and the three axes: of translation and rotation; and the error along each
-    rows = np.zeros((4, 7), np.float64)
-    rows[1, 0] = rows[2, 1] = rows[3, 2] = 1.0
+    total, H, g = np.empty(TERMS), np.empty((6, 6)), np.empty(6)
     for h in range(first, last):
         for turn in range(wide + narrow):
             far = 2 * reach if turn < wide else reach
-            H[:] = 0.0
-            g[:] = 0.0
+            total[:] = 0.0
             partners = 0
             for i in range(len(points)):
                 px, py, pz = points[i, 0], points[i, 1], points[i, 2]
@@ -114,24 +112,22 @@ def _icp(first, last, points, labels, T, others, normals, other_labels,
                     continue
                 partners += 1
                 nx, ny, nz = normals[at, 0], normals[at, 1], normals[at, 2]
-                ex, ey, ez = x - others[at, 0], y - others[at, 1], z - others[at, 2]
                 pull = 1 / (1 + found / (SOFTNESS * far)**2)**2
-                rows[0, 0], rows[0, 1], rows[0, 2] = nx, ny, nz
-                rows[0, 3], rows[0, 4] = ly * nz - lz * ny, lz * nx - lx * nz
-                rows[0, 5], rows[0, 6] = lx * ny - ly * nx, ex * nx + ey * ny + ez * nz
-                rows[1, 4], rows[1, 5], rows[1, 6] = lz, -ly, ex
-                rows[2, 3], rows[2, 5], rows[2, 6] = -lz, lx, ey
-                rows[3, 3], rows[3, 4], rows[3, 6] = ly, -lx, ez
-                for r in range(4):
-                    weight = pull * (1 - TANGENTIAL if r == 0 else TANGENTIAL)
-                    for a in range(6):
-                        g[a] += weight * rows[r, a] * rows[r, 6]
-                        for b in range(a + 1):
-                            H[a, b] += weight * rows[r, a] * rows[r, b]
+                # in full across the surface, a share of it along
+                across, along = pull * (1 - TANGENTIAL), pull * TANGENTIAL
+                add_pair(total, lx, ly, lz,
+                         across * nx * nx + along, across * nx * ny, across * nx * nz,
+                         across * ny * ny + along, across * ny * nz, across * nz * nz + along,
+                         x - others[at, 0], y - others[at, 1], z - others[at, 2])
             if partners < FEWEST_PARTNERS:
                 break
+            k = 0
             for a in range(6):
+                for b in range(a + 1):
+                    H[a, b] = total[k]
+                    k += 1
                 H[a, a] += 1e-6 * partners    # points on a line leave a turn about it free
+                g[a] = total[21 + a]
             _solve(H, g)
             _turn(T[h], g)
 

@@ -1,4 +1,4 @@
-"""The way in (`SemanticScan`), and what is made of it (`PreparedScan`)."""
+"""One scan as it comes in: points and labels (`SemanticScan`)."""
 from dataclasses import dataclass
 
 import numpy as np

@@ -2,8 +2,8 @@
 
 Under the right pose the keypoints of one scan lie on surfaces of the other with the same regional
 label (*overlap*), and none hangs in the air that the other sensor has looked through (a
-*free-space violation*). What the other sensor could not see says nothing. Both are asked of both
-scans.
+*free-space violation*). What the other sensor could not see counts for neither. Both are counted
+over the keypoints of both scans.
 """
 from dataclasses import dataclass
 import math
@@ -33,10 +33,10 @@ MARGIN, MARGIN_SHARE = 0.5, 0.02
 by this share of the maximum correspondence distance and this share of the range."""
 VIOLATION_WEIGHT = 5.0
 """A violation weighs so many agreements: the right pose has hardly any."""
-DOUBT = 0.01
-"""Share of keypoints that speaks against every pose: a handful alone proves nothing."""
+PRIOR_AGAINST = 0.01
+"""Share of keypoints that counts against every pose: a handful of agreements is no evidence."""
 ROUGH_KEYPOINTS = 400
-"""Keypoints asked for each hypothesis of the solver."""
+"""Keypoints scored for each hypothesis of the solver."""
 
 
 @dataclass(frozen=True)
@@ -56,12 +56,12 @@ class PoseScore:
 
     @property
     def confidence(self) -> float:
-        """The weight of those that speak for it among those that speak, 0 to 1."""
-        return self.overlap / (self.overlap + VIOLATION_WEIGHT * self.violations + DOUBT)
+        """The share of the agreements among what counts for or against the pose, 0 to 1."""
+        return self.overlap / (self.overlap + VIOLATION_WEIGHT * self.violations + PRIOR_AGAINST)
 
 
 def pose_score(outcomes: NDArray[np.int8]) -> PoseScore:
-    """Sum up the outcomes (n,) of all keypoints that were asked."""
+    """Sum up the outcomes (n,) of keypoints."""
     asked = max(len(outcomes), 1)
     return PoseScore(int((outcomes == AGREES).sum()) / asked,
                      int((outcomes == VIOLATES).sum()) / asked)
@@ -69,14 +69,14 @@ def pose_score(outcomes: NDArray[np.int8]) -> PoseScore:
 
 def score_keypoints(source: ScanIndex, target: ScanIndex, T_target_source: NDArray[np.float64],
                     keypoints: int) -> NDArray[np.int8]:
-    """Ask keypoints of both scans about poses.
+    """Score keypoints of both scans under poses.
 
     Parameters
     ----------
     source, target : ScanIndex
     T_target_source : (H, 4, 4) float64
     keypoints : int
-        How many to ask of each scan, evenly spread.
+        How many of each scan, evenly spread.
 
     Returns
     -------

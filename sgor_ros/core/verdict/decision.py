@@ -1,4 +1,4 @@
-"""From the results of the stages to a verdict, which is built here and nowhere else.
+"""The verdict on a registration, from the results of the stages; it is built nowhere else.
 
 REGISTERED means that the clouds bear the transformation out, that no other pose explains them as
 well, and that they hold it in all six directions; asked in this order.
@@ -123,7 +123,7 @@ def decide_by_matches(solution: Solution, config: SgorConfig, timings: dict[str,
 
 
 def low_confidence(score: PoseScore, config: SgorConfig) -> str:
-    """Say that a score is too low."""
+    """Return the reason for refusing a score below min_confidence."""
     return (f'confidence {score.confidence:.2f} is below min_confidence '
             f'{config.min_confidence:.2f}: of the keypoints {score.overlap:.0%} agree, '
             f'{score.violations:.1%} contradict')
@@ -160,7 +160,7 @@ def _warnings(pair: Pair) -> tuple[str, ...]:
 
 
 def _ambiguity(T: Array, alternatives: tuple[Placement, ...]) -> str:
-    """Say how many placements there are, and where the best of the others lies."""
+    """Tell how many placements there are, and where the best of the others lies."""
     other = alternatives[0].T_target_source
     gap = other[:3, 3] - T[:3, 3]
     length = float(np.linalg.norm(gap))

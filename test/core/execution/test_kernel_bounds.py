@@ -26,7 +26,7 @@ for config in (SgorConfig(), SgorConfig.paper(), SgorConfig.kitti_protocol(), Sg
                           for scan in zip((p, q), labels))
         print(register(source, target, config).success)
     # walls on the edges between cells, points in one place, on a line, hardly any
-    for edge in (0.5, config.voxel_size, config.evidence_reach, 5.0):
+    for edge in (0.5, config.voxel_size, config.max_correspondence_distance, 5.0):
         walls = np.round(rng.uniform(-20, 20, (2000, 3)) / edge) * edge
         for points in (walls, walls[:1].repeat(50, 0), walls * (1, 0, 0), walls[:5], walls[:1]):
             prepared = preprocess(SemanticScan(points), config.replace(min_range=0.0))
