@@ -242,6 +242,15 @@ def test_there_is_no_information_along_free_directions():
                                np.diag([0, 1 / 4, 1 / 9, 100, 0, 1 / 0.09]), atol=1e-9)
 
 
+@pytest.mark.parametrize('variance', [1e-12, 1e-20])
+def test_free_directions_weigh_alike_whatever_their_covariance(variance):
+    """A turn known to 1e-10 rad hides no shift that is free as well."""
+    covariance = np.diag([1.0] * 3 + [variance] * 3)
+    found = _information(placement(np.eye(4), covariance, np.vstack((ALONG_X, ABOUT_Z))))
+    np.testing.assert_allclose(np.diag(found), [0, 1, 1, 1 / variance, 1 / variance, 0],
+                               rtol=1e-6, atol=1e-6)
+
+
 def test_information_of_correlated_errors_along_a_free_direction():
     """What is left is that of the other directions alone: the marginal is what was measured."""
     rng = np.random.default_rng(1)

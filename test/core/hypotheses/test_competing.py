@@ -256,7 +256,7 @@ def test_compete_with_radius_zero_scores_the_pose_alone(pillars):
 
 def test_a_pose_that_scores_too_low_gets_more_rounds():
     """And is scored anew; what competes stays. One that scores enough is left as it is."""
-    source, target = scattered(0), scattered(1)
+    source, target = scattered(4), scattered(5)
     plain = hypothesis_test(source, target, np.eye(4), NOTHING, 30.0)
     confidence = pose_score(plain.outcomes).confidence
     assert 0.9 < confidence < 1
@@ -266,6 +266,7 @@ def test_a_pose_that_scores_too_low_gets_more_rounds():
     T = icp(source, target, plain.T_target_source[None], 10, 10)
     assert not np.array_equal(T[0], plain.T_target_source)
     np.testing.assert_array_equal(more.T_target_source, T[0])
+    assert not np.array_equal(more.outcomes, plain.outcomes)
     np.testing.assert_array_equal(more.outcomes, score_keypoints(source, target, T, 1000)[0])
     np.testing.assert_array_equal(more.competing, plain.competing)
     np.testing.assert_array_equal(more.competing_outcomes, plain.competing_outcomes)
