@@ -76,6 +76,7 @@ setup(
         'docs': ['sphinx>=8', 'numpydoc>=1.8', 'myst-parser>=4', 'furo'],
         'dev': [
             'mypy',
+            'mutmut>=3.8',
             'ruff',
             'build',
             'catkin-pkg',

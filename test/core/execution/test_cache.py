@@ -12,6 +12,8 @@ import pytest
 
 import sgor_ros
 
+pytestmark = pytest.mark.slow    # processes that compile anew
+
 # of one small kernel: how often it is compiled
 CODE = """
 from numba.core import event

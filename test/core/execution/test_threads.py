@@ -109,6 +109,7 @@ def test_threads_that_share_at_the_same_time():
             assert np.all(taken == 1)
 
 
+@pytest.mark.slow
 def test_one_thread_is_one_thread():
     """With threads = 1 no other thread of the process works, not even one that spins."""
     config = SgorConfig(threads=1)
