@@ -69,7 +69,7 @@ def make_tasks(arguments) -> list[str]:
     """Write matches and scans into the folder; return the names of what is to be timed."""
     from sgor_ros.commands.benchmarks.inputs import WORLD_SCANS
     from sgor_ros.commands.benchmarks.inputs import WORLD_SPEED
-    from sgor_ros.evaluation import pairs as pairing
+    from sgor_ros.evaluation.protocols import pairs as pairing
     from sgor_ros.evaluation.solver import fpfh_matches
     from sgor_ros.evaluation.solver import made_up
     from sgor_ros.io.datasets import open_drives
@@ -85,8 +85,8 @@ def make_tasks(arguments) -> list[str]:
     sets = [(f'made up, {count}', made_up(count, 0.02, 0)) for count in arguments.counts]
     sets += [(f'FPFH, {m.name}', m) for m in fpfh_matches(chosen, 8000)]
     tasks = []
-    for name, matches in sets:
-        np.savez(FOLDER / f'{name}.npz', source=matches.source, target=matches.target)
+    for name, pair in sets:
+        np.savez(FOLDER / f'{name}.npz', source=pair.matches.source, target=pair.matches.target)
         tasks += [f'{name}, default', f'{name}, paper']
     for pair in chosen:
         name = f'two raw scans, {pair.data_set}, {pair.distance_m:.0f} m'

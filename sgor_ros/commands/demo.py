@@ -15,10 +15,10 @@ from tqdm import tqdm
 
 from ..core.common.settings import InputError
 from ..core.config import SgorConfig
-from ..evaluation.track import track_errors
-from ..evaluation.track import TrackErrors
-from ..evaluation.track_plots import plot_against_truth
-from ..evaluation.track_plots import plot_errors
+from ..evaluation.metrics.trajectory import track_errors
+from ..evaluation.metrics.trajectory import TrackErrors
+from ..evaluation.report.track_plots import plot_against_truth
+from ..evaluation.report.track_plots import plot_errors
 from ..io.bags import BagReader
 from ..io.bags import CLOUD_TYPE
 from ..io.messages import matrix_of

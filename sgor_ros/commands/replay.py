@@ -17,7 +17,7 @@ from ..core.common.settings import InputError
 from ..core.config import SgorConfig
 from ..core.scan.labels import label_convention
 from ..core.warmup import warm_up
-from ..evaluation.track_plots import plot_track
+from ..evaluation.report.track_plots import plot_track
 from ..io.bags import BagReader
 from ..io.bags import BagWriter
 from ..io.bags import is_bag

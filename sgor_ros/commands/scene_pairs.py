@@ -6,9 +6,9 @@ from numpy.typing import NDArray
 
 from ..core.common import se3
 from ..core.common.settings import InputError
-from ..evaluation.pairs import drive_of
-from ..evaluation.pairs import frame_in_memory
-from ..evaluation.pairs import Pair
+from ..evaluation.protocols.pairs import drive_of
+from ..evaluation.protocols.pairs import frame_in_memory
+from ..evaluation.protocols.pairs import Pair
 from ..io.datasets import Drive
 from ..io.datasets import Frame
 

@@ -11,29 +11,29 @@ import sys
 from ..core.common.settings import InputError
 from ..core.config import SgorConfig
 from ..core.warmup import warm_up
-from ..evaluation import pairs as pairing
-from ..evaluation import run as on_scans
-from ..evaluation.ablation import PAPER_ROWS
+from ..evaluation.front_end import Features
+from ..evaluation.methods import available
 from ..evaluation.methods import Method
-from ..evaluation.methods import rivals
+from ..evaluation.methods import ON_MATCHES
+from ..evaluation.methods import ON_SCANS
 from ..evaluation.methods import sgor
-from ..evaluation.protocols import page
+from ..evaluation.methods import sgor_solver
+from ..evaluation.methods.interface import OnMatches
+from ..evaluation.protocols import pairs as pairing
 from ..evaluation.protocols import studies
+from ..evaluation.protocols.ablation import PAPER_ROWS
 from ..evaluation.protocols.drives import posed
 from ..evaluation.protocols.drives import strided
-from ..evaluation.protocols.front_end import Features
-from ..evaluation.protocols.given import given_matches
 from ..evaluation.protocols.indoor import depth_frames
 from ..evaluation.protocols.indoor import threedmatch
 from ..evaluation.protocols.kitti import kitti_10m
 from ..evaluation.protocols.kitti import kitti_10m_list
 from ..evaluation.protocols.kitti import kitti_loops
-from ..evaluation.protocols.run import Entry
-from ..evaluation.protocols.run import run
-from ..evaluation.protocols.task import Protocol
-from ..evaluation.protocols.task import Task
+from ..evaluation.protocols.match_files import given_matches
+from ..evaluation.protocols.protocol import Protocol
 from ..evaluation.protocols.truth import refined
-from ..evaluation.rivals import Answer
+from ..evaluation.report import page
+from ..evaluation.runner import run
 from ..io.datasets import Drive
 from ..io.datasets import Frame
 from ..io.datasets import open_drives
@@ -78,7 +78,7 @@ def _parser() -> frame.Parser:
     add('--limit', type=int, default=0, metavar='PAIRS', help='evenly spread; 0: all')
     add('--methods', nargs='+', metavar='NAME', help='of the table; default: all that there are')
     add('--method', action='append', default=[], metavar='MODULE:FUNCTION',
-        help='one of your own: takes Matches, returns a Solution')
+        help='one of your own: takes Matches, returns an Answer')
     add('--raw', action='store_true',
         help='also what registers raw scans: SGOR with all of ours, and KISS-Matcher')
     add('--study', choices=[*studies.STUDIES, ABLATION], default='',
@@ -99,7 +99,7 @@ def _parser() -> frame.Parser:
 def _tables(arguments: Namespace) -> int:
     output: Path = arguments.output or Path('out') / arguments.protocol
     protocol = PROTOCOLS[arguments.protocol](arguments)
-    if not protocol.tasks:
+    if not protocol.pairs:
         raise InputError(f'no pair of {protocol.name} in {arguments.data or "the built-in world"}'
                          + (f'; {protocol.missing} in the list, their scans are not there'
                             if protocol.missing else ''))
@@ -107,39 +107,35 @@ def _tables(arguments: Namespace) -> int:
     if arguments.front_end == 'paper':
         protocol = replace(protocol, front_end=SgorConfig.paper())
     if arguments.refine_truth:
-        protocol = _with(protocol, refined(protocol.tasks, output / 'truth.json'))
+        protocol = replace(protocol, pairs=refined(protocol.pairs, output / 'truth.json'))
     study = '' if arguments.study == ABLATION else arguments.study
-    entries = _entries(arguments, protocol)
-    inputs.say(f'{protocol.name}: {len(protocol.tasks)} pairs, {len(entries)} methods; {output}')
+    methods = _methods(arguments, protocol)
+    inputs.say(f'{protocol.name}: {len(protocol.pairs)} pairs, {len(methods)} methods; {output}')
     warm_up(protocol.front_end)
     features = None if arguments.features is None else Features(arguments.features)
-    records = run(protocol, entries, output, features=features,
+    rows = run(protocol, methods, output, features=features,
                   variants=studies.variants(study, arguments.values, arguments.seed),
                   processes=arguments.processes, dask=arguments.dask)
-    print(page.write(output, records, protocol, entries, study, features))
+    print(page.write(output, rows, protocol, methods, study, features))
     return frame.OK
 
 
-def _entries(arguments: Namespace, protocol: Protocol) -> list[Entry]:
+def _methods(arguments: Namespace, protocol: Protocol) -> list[Method]:
     own = protocol.front_end
     if arguments.study == ABLATION:
-        rows = {row.method: row.changes for row in PAPER_ROWS}
-        return [Entry(name, sgor(own.replace(**changes)), own.replace(**changes))
-                for name, changes in rows.items()]
-    entries = [Entry('SGOR', sgor(own))]
-    entries += [Entry(name, method) for name, method in rivals(inputs.say).items()]
-    if arguments.raw and all(task.matches is None for task in protocol.tasks):
-        methods = [on_scans.sgor('SGOR, all of ours, from scans', _everything(protocol)),
-                   *on_scans.rivals(inputs.say).values()]
-        entries += [Entry(method.name, on_scans=partial(_from_scans, method))
-                    for method in methods]
+        configs = {row.method: own.replace(**row.changes) for row in PAPER_ROWS}
+        return [sgor_solver(name, config, config) for name, config in configs.items()]
+    methods = [sgor_solver('SGOR', own), *available(ON_MATCHES, inputs.say).values()]
+    if arguments.raw and all(pair.matches is None for pair in protocol.pairs):
+        methods += [sgor('SGOR, all of ours, from scans', _everything(protocol)),
+                    *available(ON_SCANS, inputs.say).values()]
     if arguments.methods:
-        known = {entry.name: entry for entry in entries}
+        known = {method.name: method for method in methods}
         wrong = [name for name in arguments.methods if name not in known]
         if wrong:
             raise InputError(f'--methods {wrong[0]}: not one of {", ".join(known)}')
-        entries = [known[name] for name in arguments.methods]
-    return entries + [Entry(name, _imported(name)) for name in arguments.method]
+        methods = [known[name] for name in arguments.methods]
+    return methods + [Method(name, on_matches=_imported(name)) for name in arguments.method]
 
 
 def _everything(protocol: Protocol) -> SgorConfig:
@@ -147,19 +143,11 @@ def _everything(protocol: Protocol) -> SgorConfig:
         else SgorConfig()
 
 
-def _from_scans(method: on_scans.Method, task: Task) -> Answer:
-    assert task.source is not None
-    assert task.target is not None
-    return method.run(on_scans.Sample(task.source.read(), task.target.read(),
-                                      task.source.label_convention,
-                                      task.target.label_convention, 0))
-
-
-def _imported(name: str) -> Method:
+def _imported(name: str) -> OnMatches:
     module, _, function = name.partition(':')
     sys.path.insert(0, '')
     try:
-        found: Method = getattr(import_module(module), function)
+        found: OnMatches = getattr(import_module(module), function)
     except (ImportError, AttributeError, ValueError) as error:
         raise InputError(f'--method {name}: expected MODULE:FUNCTION: {error}') from error
     return found
@@ -218,14 +206,10 @@ def _indoor(arguments: Namespace, *, depth: bool) -> Protocol:
 
 
 def _spread(protocol: Protocol, most: int) -> Protocol:
-    count = len(protocol.tasks)
+    count = len(protocol.pairs)
     if not 0 < most < count:
         return protocol
-    return _with(protocol, [protocol.tasks[i * count // most] for i in range(most)])
-
-
-def _with(protocol: Protocol, tasks: Sequence[Task]) -> Protocol:
-    return replace(protocol, tasks=tasks)
+    return replace(protocol, pairs=[protocol.pairs[i * count // most] for i in range(most)])
 
 
 PROTOCOLS: dict[str, Callable[[Namespace], Protocol]] = {

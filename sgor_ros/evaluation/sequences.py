@@ -2,8 +2,6 @@
 from collections.abc import Callable
 from collections.abc import Sequence
 from dataclasses import dataclass
-from dataclasses import replace
-from importlib.util import find_spec
 import time
 
 import numpy as np
@@ -11,27 +9,20 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from ..core.config import SgorConfig
-from ..core.scan.scan import SemanticScan
 from ..core.warmup import warm_up
 from ..io.datasets import Drive
-from ..tracker import TrackedScan
-from ..tracker import Tracker
-from ..tracker import TrackerConfig
-from .honesty import Said
-from .honesty import what_was_said
-from .metrics import KITTI_LENGTHS_M
-from .rivals import kiss_icp
-from .rivals import scan_to_scan
-from .track import track_errors
-from .track import TrackErrors
+from .methods.odometries import Step
+from .methods.odometries import TrackerOdometry
+from .metrics.consistency import ScanConsistency
+from .metrics.consistency import track_consistency
+from .metrics.trajectory import KITTI_LENGTHS_M
+from .metrics.trajectory import track_errors
+from .metrics.trajectory import TrackErrors
 
 Array = NDArray[np.float64]
 
-PERIOD_NS = 100_000_000
 SETTLED = 3
 """Scans at the start whose time does not count: caches and local maps fill."""
-
-Step = Callable[[SemanticScan], Array | None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,8 +42,8 @@ class Track:
     seconds : (N,) float64
     cpu_seconds : (N,) float64
         Of all threads together: what the clock shows depends on who else wants the cores.
-    said : list of Said
-        For each scan; empty where the odometry says nothing but poses.
+    consistency : list of ScanConsistency
+        For each scan; empty where the odometry gives nothing but poses.
     """
 
     method: str
@@ -63,50 +54,7 @@ class Track:
     without_pose: int
     seconds: Array
     cpu_seconds: Array
-    said: list[Said]
-
-
-def trackers(config: SgorConfig, *, unlabelled: bool) -> dict[str, Callable[[], Step]]:
-    """Return what makes the tracker, by the name of its mode; also without labels if asked."""
-    return {f'SGOR, {mode}{"" if labels else ", no labels"}':
-            lambda mode=mode, labels=labels: _Sgor(config, mode, labels)    # type: ignore[misc]
-            for labels in (True, False)[:1 + unlabelled] for mode in ('consecutive', 'keyframe')}
-
-
-def odometries(config: SgorConfig, say: Callable[[str], None], *, unlabelled: bool = False
-               ) -> dict[str, Callable[[], Step]]:
-    """Return what makes each odometry, by name; rivals where they are installed."""
-    makers = trackers(config, unlabelled=unlabelled)
-    if find_spec('kiss_icp') is None:
-        say('kiss_icp is not installed, so left out; to have it: pip install kiss-icp')
-    else:
-        makers['KISS-ICP'] = lambda: _unlabelled(kiss_icp())
-    if find_spec('small_gicp') is None:
-        say("small_gicp is not installed, so left out; pip install 'sgor_ros[benchmark]'")
-    else:
-        makers['small_gicp, scan to scan'] = lambda: _unlabelled(scan_to_scan(config.threads))
-    return makers
-
-
-class _Sgor:
-    """The tracker, and what it said of each scan."""
-
-    def __init__(self, config: SgorConfig, mode: str, labels: bool) -> None:
-        self._tracker = Tracker(config, TrackerConfig(mode=mode))
-        self._labels = labels
-        self.tracked: list[TrackedScan] = []
-
-    def __call__(self, scan: SemanticScan) -> Array | None:
-        # built anew, as a raw scan has to be
-        labels = scan.labels if self._labels else np.zeros_like(scan.labels)
-        result = self._tracker.track(SemanticScan(scan.points, labels),
-                                     (len(self.tracked) + 1) * PERIOD_NS)
-        self.tracked.append(replace(result, registration=None))
-        return result.T_odom_sensor
-
-
-def _unlabelled(take: Callable[[NDArray[np.float32]], Array]) -> Step:
-    return lambda scan: take(scan.points)
+    consistency: list[ScanConsistency]
 
 
 def run_drive(drive: Drive, makers: dict[str, Callable[[], Step]], config: SgorConfig
@@ -146,4 +94,5 @@ def _track(method: str, drive: str, poses: Sequence[Array | None], truth: Array,
     clock, processor = np.array(seconds).T
     return Track(method, drive, track_errors(np.array(held), truth, lengths), truth, lengths,
                  sum(T is None for T in poses), clock, processor,
-                 what_was_said(odometry.tracked, truth) if isinstance(odometry, _Sgor) else [])
+                 track_consistency(odometry.tracked, truth)
+                 if isinstance(odometry, TrackerOdometry) else [])

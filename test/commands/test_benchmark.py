@@ -5,21 +5,19 @@ import json
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
-
-from sgor_ros.commands.benchmark import main
-from sgor_ros.core.config import SgorConfig
-from sgor_ros.evaluation import pairs as pairing
-from sgor_ros.evaluation import report
-from sgor_ros.evaluation import solver
 from sgor_ros.evaluation.ablation import PAPER_ROWS
-from sgor_ros.evaluation.metrics import THREE_SIGMA
 from sgor_ros.evaluation.pairs import Pair
 from sgor_ros.evaluation.rivals import Answer
 from sgor_ros.evaluation.run import Method
 from sgor_ros.evaluation.run import Row
 from sgor_ros.evaluation.run import run_pairs
-from sgor_ros.evaluation.run import sample_of
 from sgor_ros.evaluation.run import sgor
+
+from sgor_ros.commands.benchmark import main
+from sgor_ros.core.config import SgorConfig
+from sgor_ros.evaluation import pairs as pairing
+from sgor_ros.evaluation import solver
+from sgor_ros.evaluation.metrics import NEES_BOUND
 from sgor_ros.io.datasets import Drive
 from sgor_ros.io.datasets import open_drives
 from sgor_ros.io.trajectories import write_kitti
@@ -156,19 +154,19 @@ def test_wrong_pairs_are_of_different_places():
 
 def test_the_truth_of_a_turned_pair_maps_the_same_points(sequences_folder):
     pair = pairing.near_pairs(open_drives(sequences_folder), 36.0)[2]
-    sample, truth = sample_of(pair, seed=3)
+    sample, truth = turned(pair, seed=3)
     scan = pair.source.read().points.astype(float)
     before = scan @ pair.T_target_source[:3, :3].T + pair.T_target_source[:3, 3]
     after = sample.source.points.astype(float) @ truth[:3, :3].T + truth[:3, 3]
     assert np.allclose(before, after, atol=1e-3)
     assert np.linalg.norm(scan - sample.source.points, axis=1).max() > 5
-    again, _ = sample_of(pair, seed=3)
+    again, _ = turned(pair, seed=3)
     assert np.array_equal(again.source.points, sample.source.points)
 
 
 def test_random_labels_replace_the_share_that_was_asked_for():
     labels = np.repeat([40, 50, 70, 80], 5000)
-    spoiled = pairing.random_labels(labels, 0.5, np.random.default_rng(0))
+    spoiled = random_labels(labels, 0.5, np.random.default_rng(0))
     # a quarter of the random ones are right by chance
     assert np.mean(spoiled != labels) == pytest.approx(0.375, abs=0.02)
     assert set(spoiled) == {40, 50, 70, 80}
@@ -178,9 +176,9 @@ def test_random_labels_replace_the_share_that_was_asked_for():
 def test_heights_count_only_where_they_are_known(sequences_folder, heights_known):
     pair = pairing.near_pairs(open_drives(sequences_folder), 36.0)[0]
     pair = Pair(pair.source, pair.target, pair.T_target_source, heights_known=heights_known)
-    too_high = sample_of(pair, seed=0)[1]
+    too_high = turned(pair, seed=0)[1]
     too_high[2, 3] += 1.0
-    method = Method('m', lambda sample: Answer(too_high, 0.1, True, 1.0))
+    method = Method('m', lambda sample: Answer(too_high, score=1.0))
     found, = run_pairs([pair], [method], seed=0)
     assert found.success is not heights_known
     assert found.false_accept is heights_known
@@ -190,23 +188,23 @@ def test_heights_count_only_where_they_are_known(sequences_folder, heights_known
 
 def test_recall_counts_neither_refused_nor_wrong_answers():
     rows = [row(), row(valid=False), row(within=False), row()]
-    assert report.recall(rows) == '50.0 % (2/4)'
+    assert tables.recall(rows) == '50.0 % (2/4)'
     rows[0] = row(rotation_error_deg=0.3, translation_error_m=0.04)
-    assert report.errors(rows) == ('0.20 / 0.20', '3.0 / 3.0')
-    assert report.recall(report.in_band([row(distance=10.0), row(distance=9.9)], 0, 10)
+    assert tables.errors(rows) == ('0.20 / 0.20', '3.0 / 3.0')
+    assert tables.recall(tables.in_band([row(distance=10.0), row(distance=9.9)], 0, 10)
                          ) == '100.0 % (1/1)'
 
 
 def test_times_of_few_runs_are_marked():
-    assert report.times([0.1, 0.2, 0.3]) == '200 / 290 (only 3)'
-    assert report.times(np.arange(1, 22) / 1000) == '11 / 20'
-    assert report.times([float('nan')]) == '-'
+    assert tables.times([0.1, 0.2, 0.3]) == '200 / 290 (only 3)'
+    assert tables.times(np.arange(1, 22) / 1000) == '11 / 20'
+    assert tables.times([float('nan')]) == '-'
 
 
 def test_the_table_tells_false_accepts_apart():
     rows = [row(), row(within=False), row(right=False, within=False),
             row(right=False, within=False, valid=False)]
-    line = report.pairs_table(rows, ['m'], {'m': 321.4}).splitlines()[-1]
+    line = tables.pairs_table(rows, ['m'], {'m': 321.4}).splitlines()[-1]
     cells = [cell.strip() for cell in line.strip('|').split('|')]
     assert cells[0] == 'm'
     assert cells[1] == '50.0 % (1/2)'
@@ -216,7 +214,7 @@ def test_the_table_tells_false_accepts_apart():
 def test_thresholds_refuse_below_and_accept_from_there_on():
     rows = [row(0.5), row(0.9), row(0.7, distance=25.0), row(0.7, within=False),
             row(0.8, right=False, within=False), row(0.2, right=False, within=False)]
-    refused, near, bad, wrong = report.at_threshold(rows, 0.8)
+    refused, near, bad, wrong = at_threshold(rows, 0.8)
     assert refused.tolist() == [True, False, True]
     assert near.tolist() == [True, False]
     assert bad.tolist() == [False]
@@ -225,22 +223,22 @@ def test_thresholds_refuse_below_and_accept_from_there_on():
 
 def test_sgor_refused_for_few_inliers_passes_no_threshold(sequences_folder):
     pair = pairing.near_pairs(open_drives(sequences_folder), 36.0)[0]
-    sample, _ = sample_of(pair, seed=0)
-    answer = sgor('m', SgorConfig(min_inliers=10000)).run(sample)
+    sample, _ = turned(pair, seed=0)
+    answer = sgor('m', SgorConfig(min_inliers=10000)).on_scans(sample)
     assert not answer.valid
     assert answer.score == 0.0
-    assert sgor('m', SgorConfig()).run(sample).score > 0.9
+    assert sgor('m', SgorConfig()).on_scans(sample).score > 0.9
 
 
 def test_made_up_matches_hold_the_share_of_right_ones():
-    matches = solver.made_up(2000, 0.1, seed=0)
-    T = matches.T_target_source
+    pair = solver.made_up(2000, 0.1, seed=0)
+    T, matches = pair.T_target_source, pair.matches
     residuals = np.linalg.norm(matches.source @ T[:3, :3].T + T[:3, 3] - matches.target, axis=1)
     assert np.sum(residuals < 0.6) == pytest.approx(200, abs=3)
 
 
 def test_real_matches_are_read_with_their_truth(data_folder):
-    sets = {matches.name: matches for matches in solver.real_matches(data_folder)}
+    sets = {pair.name: pair.matches for pair in solver.real_matches(data_folder)}
     assert set(sets) == {'kitti_000', 'kitti_010', 'kitti_020'}
     assert all(m.source.shape == m.target.shape and len(m.source) > 4000 for m in sets.values())
 
@@ -272,8 +270,7 @@ def test_pairs_command(sequences_folder, tmp_path, capsys):
 
 def test_peak_memory_is_of_each_method_alone(sequences_folder, tmp_path):
     pair = pairing.near_pairs(open_drives(sequences_folder), 36.0)[0]
-    sample, _ = sample_of(pair, seed=0)
-    from sgor_ros.evaluation.run import peak_memory_mb
+    sample, _ = turned(pair, seed=0)
     ballast = np.ones(60_000_000)    # 480 MB here, none of them there
     memory = peak_memory_mb([Method('big', _allocate)], sample)
     assert 30 < memory[''] < 450
@@ -282,7 +279,7 @@ def test_peak_memory_is_of_each_method_alone(sequences_folder, tmp_path):
 
 
 def _allocate(sample):
-    return Answer(None, float(np.ones(25_000_000).sum()), False, 0.0)    # 200 MB
+    return Answer(None, score=float(np.ones(25_000_000).sum()))    # 200 MB
 
 
 def test_wrong_command(sequences_folder, tmp_path):
@@ -343,7 +340,7 @@ def test_sequence_command(sequences_folder, tmp_path):
         if r['state'] == 'tracking':
             assert float(r['error_m']) == pytest.approx(float(r['off_the_truth_m']), abs=1e-6)
             assert 0.002 < float(r['claimed_m']) < 0.5
-            assert float(r['pose_nees']) < THREE_SIGMA
+            assert float(r['pose_nees']) < NEES_BOUND
 
 
 def test_sequence_command_through_places(tmp_path):

@@ -11,7 +11,7 @@ from sgor_ros.commands.demo import forth_and_back
 from sgor_ros.commands.world_bag import write_world_bag
 from sgor_ros.core.common import se3
 from sgor_ros.core.common.settings import InputError
-from sgor_ros.evaluation.track import track_errors
+from sgor_ros.evaluation.metrics.trajectory import track_errors
 from sgor_ros.io.bags import BagReader
 from sgor_ros.world import simulate
 

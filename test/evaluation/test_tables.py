@@ -11,19 +11,22 @@ import time
 import numpy as np
 from PIL import Image
 import pytest
+from sgor_ros.evaluation.pairs import drive_of
+from sgor_ros.evaluation.protocols.run import run
+from sgor_ros.evaluation.protocols.tables import latex
+from sgor_ros.evaluation.protocols.tables import main_rows
+from sgor_ros.evaluation.protocols.tables import whole
+from sgor_ros.evaluation.protocols.task import EASY
 
 from sgor_ros import InputError
 from sgor_ros.core.common import se3
 from sgor_ros.evaluation.methods import Matches
-from sgor_ros.evaluation.methods import Solution
 from sgor_ros.evaluation.metrics import kept_scores
-from sgor_ros.evaluation.pairs import drive_of
 from sgor_ros.evaluation.protocols import front_end
 from sgor_ros.evaluation.protocols import record
 from sgor_ros.evaluation.protocols import studies
 from sgor_ros.evaluation.protocols.drives import posed
 from sgor_ros.evaluation.protocols.drives import strided
-from sgor_ros.evaluation.protocols.given import given_matches
 from sgor_ros.evaluation.protocols.indoor import cloud_of_depth
 from sgor_ros.evaluation.protocols.indoor import depth_frames
 from sgor_ros.evaluation.protocols.indoor import threedmatch
@@ -32,12 +35,7 @@ from sgor_ros.evaluation.protocols.kitti import kitti_10m_list
 from sgor_ros.evaluation.protocols.kitti import kitti_loops
 from sgor_ros.evaluation.protocols.kitti import read_pair_list
 from sgor_ros.evaluation.protocols.kitti import ten_metre_pairs
-from sgor_ros.evaluation.protocols.run import Entry
-from sgor_ros.evaluation.protocols.run import run
-from sgor_ros.evaluation.protocols.tables import latex
-from sgor_ros.evaluation.protocols.tables import main_rows
-from sgor_ros.evaluation.protocols.tables import whole
-from sgor_ros.evaluation.protocols.task import EASY
+from sgor_ros.evaluation.protocols.match_files import given_matches
 from sgor_ros.evaluation.protocols.truth import refined
 from sgor_ros.world import Lidar
 from sgor_ros.world import simulate
@@ -55,7 +53,7 @@ def drive():
 def centroid(matches):
     """Stand in for a method that is quick and the same everywhere: shift by the median."""
     shift = np.median(matches.target - matches.source, axis=0)
-    return Solution(se3.compose(np.eye(3), shift), np.arange(0, len(matches.source), 2))
+    return Answer(se3.compose(np.eye(3), shift), np.arange(0, len(matches.source), 2))
 
 
 def tired(matches):
@@ -71,9 +69,9 @@ def slow(matches):
     return centroid(matches)
 
 
-def text_of(records):
+def text_of(rows):
     """Return what a run says, times left out."""
-    return record.lines(replace(each, seconds=0.0) for each in records)
+    return table.lines(replace(each, seconds=0.0) for each in rows)
 
 
 def test_ten_metre_rule_by_hand():
@@ -96,7 +94,7 @@ def test_lists_and_rule_of_kitti():
     for before, row in itertools.pairwise(rows):
         assert row[0] != before[0] or row[1] > before[3]
     found = kitti_10m_list(lists / 'kitti_10m.txt', lambda *_: None)
-    assert (len(found.tasks), found.missing) == (0, 555)
+    assert (len(found.pairs), found.missing) == (0, 555)
     sizes = [len(read_pair_list(lists / f'kitti_loops_{band}.txt'))
              for band in ('0_10', '10_20', '20_30')]
     assert sizes == [914, 1151, 1260]
@@ -122,24 +120,24 @@ def test_listed_pairs_are_found_by_sequence_and_scan(tmp_path, drive):
     path = tmp_path / 'kitti_loops_0_10.txt'
     path.write_text(f'header\n0 1 0 3 {truth}\n0 1 0 99 {truth}\n')
     found = kitti_loops([path], lambda s, i: drive.frames[i] if i < 6 else None)
-    task, = found.tasks
-    assert (task.name, task.group, found.missing) == ('00 1 00 3', '0-10 m', 1)
-    assert task.source is drive.frames[1]
-    assert task.target is drive.frames[3]
+    pair, = found.pairs
+    assert (pair.name, pair.group, found.missing) == ('00 1 00 3', '0-10 m', 1)
+    assert pair.source is drive.frames[1]
+    assert pair.target is drive.frames[3]
 
 
 def test_truth_of_made_pairs(drive):
     """The truth maps the source, and pairs are the ones that were asked for."""
     T = drive.T_world_sensor
     by_rule = kitti_10m([drive], [T[:, :3, 3]])
-    assert [task.name for task in by_rule.tasks] == ['street 0 3', 'street 4 5'][
-        :len(by_rule.tasks)]
+    assert [pair.name for pair in by_rule.pairs] == ['street 0 3', 'street 4 5'][
+        :len(by_rule.pairs)]
     strides = strided([drive], [2])
-    assert len(strides.tasks) == 4
+    assert len(strides.pairs) == 4
     for protocol in (by_rule, strides, posed([drive], 7.0)):
-        for task in protocol.tasks:
-            i, j = drive.frames.index(task.source), drive.frames.index(task.target)
-            assert task.T_target_source == pytest.approx(np.linalg.inv(T[j]) @ T[i])
+        for pair in protocol.pairs:
+            i, j = drive.frames.index(pair.source), drive.frames.index(pair.target)
+            assert pair.T_target_source == pytest.approx(np.linalg.inv(T[j]) @ T[i])
 
 
 def test_kept_scores_by_hand():
@@ -153,24 +151,24 @@ def test_kept_scores_by_hand():
 
 def test_a_killed_run_goes_on_to_the_same_table(tmp_path, drive):
     protocol = strided([drive], [1, 2])
-    whole_run = run(protocol, [Entry('m', centroid)], tmp_path / 'whole')
+    whole_run = run(protocol, [Method('m', on_matches=centroid)], tmp_path / 'whole')
     tired.done = 0
     with pytest.raises(KeyboardInterrupt):
-        run(protocol, [Entry('m', tired)], tmp_path / 'killed')
+        run(protocol, [Method('m', on_matches=tired)], tmp_path / 'killed')
     # and the last line cut off
     path = tmp_path / 'killed/pairs.csv'
     path.write_text(path.read_text() + 'm,,street 4')
-    resumed = run(protocol, [Entry('m', centroid)], tmp_path / 'killed')
+    resumed = run(protocol, [Method('m', on_matches=centroid)], tmp_path / 'killed')
     assert text_of(resumed) == text_of(whole_run)
-    assert len(path.read_text().splitlines()) == 1 + len(protocol.tasks)
+    assert len(path.read_text().splitlines()) == 1 + len(protocol.pairs)
     # nothing is run again
-    assert run(protocol, [Entry('m', None)], tmp_path / 'killed') == resumed
+    assert run(protocol, [Method('m', on_matches=None)], tmp_path / 'killed') == resumed
 
 
 def test_processes_and_dask_give_the_same_table(tmp_path, drive):
     from distributed import LocalCluster
     protocol = strided([drive], [1])
-    entries = [Entry('m', centroid)]
+    entries = [Method('m', on_matches=centroid)]
     one = run(protocol, entries, tmp_path / '1')
     assert text_of(run(protocol, entries, tmp_path / '2', processes=2)) == text_of(one)
     with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
@@ -181,14 +179,14 @@ def test_processes_and_dask_give_the_same_table(tmp_path, drive):
 
 
 def test_another_protocol_does_not_go_into_the_same_folder(tmp_path, drive):
-    run(strided([drive], [1]), [Entry('m', centroid)], tmp_path)
+    run(strided([drive], [1]), [Method('m', on_matches=centroid)], tmp_path)
     with pytest.raises(InputError, match='holds a run with other settings'):
-        run(posed([drive], 5.0), [Entry('m', centroid)], tmp_path)
+        run(posed([drive], 5.0), [Method('m', on_matches=centroid)], tmp_path)
 
 
 def test_main_table_by_hand(drive):
     """Of two answers one is right: RR 50, means of RE and TE over that one, of IP over both."""
-    def row(task, te, precision):
+    def row(pair, te, precision):
         return record.Record('m', '', task, 'g', 1.0, te, precision, 0.5, 0.4, 100, 0.1, 0.02)
     protocol = strided([drive], [1])
     header, rows = main_rows([row('a', 0.1, 0.8), row('b', 3.0, 0.2)], protocol, EASY)
@@ -201,7 +199,7 @@ def test_main_table_by_hand(drive):
 
 
 def test_published_rows_stand_apart():
-    from sgor_ros.evaluation.protocols.published import KITTI_10M
+    from sgor_ros.evaluation.report.published import KITTI_10M
     sgor, = (row for row in KITTI_10M if row.method == 'SGOR')
     assert sgor[1:] == (98.92, 0.51, 7.50, 92.70, 94.59, 93.53)
     assert latex(['a_b', 'RR %'], [['x', ''], ['y', '5']]).splitlines()[2:6] == [
@@ -209,11 +207,11 @@ def test_published_rows_stand_apart():
 
 
 def test_studies_change_what_they_say(drive):
-    task = strided([drive], [1]).tasks[0]
+    pair = strided([drive], [1]).pairs[0]
     config = posed([drive], 5.0).front_end.replace(max_correspondences=500, voxel_size=0.5)
 
     def made(**change):
-        return front_end.shared_matches(task, config, 0.6, front_end.Variant(**change))
+        return front_end.shared_matches(pair, config, 0.6, studies.Variant(**change))
     whole_set, few = made(), made(matches=100)
     assert len(few.source) == 100
     given = {tuple(row) for row in np.hstack((whole_set.source, whole_set.target))}
@@ -229,26 +227,26 @@ def test_studies_change_what_they_say(drive):
 
 def test_features_from_files(tmp_path, drive):
     """Descriptors that are the same for the same place: every match is right."""
-    task = strided([drive], [1]).tasks[0]
+    pair = strided([drive], [1]).pairs[0]
     rng = np.random.default_rng(0)
-    seen = task.source.read().points.astype(np.float64)
+    seen = pair.source.read().points.astype(np.float64)
     # keypoints have to lie on the scans, and off the ground
     places = rng.permutation(seen[(seen[:, 2] > -0.5) & (np.linalg.norm(seen, axis=1) < 30)])[:600]
     described = rng.normal(size=(len(places), 32)).astype(np.float32)
-    for frame, T in ((task.source, np.eye(4)), (task.target, task.T_target_source)):
+    for frame, T in ((pair.source, np.eye(4)), (pair.target, pair.T_target_source)):
         path = tmp_path / f'{frame.name}.npz'
         path.parent.mkdir(parents=True, exist_ok=True)
         np.savez(path, points=se3.transform(T, places), descriptors=described)
     config = strided([drive], [1]).front_end.replace(semantics='none', secondary_ground=False)
-    found = front_end.shared_matches(task, config, 0.6, front_end.Variant(),
+    found = front_end.shared_matches(pair, config, 0.6, studies.Variant(),
                                      front_end.Features(tmp_path))
-    moved = se3.transform(task.T_target_source, found.source)
+    moved = se3.transform(pair.T_target_source, found.source)
     right = np.linalg.norm(moved - found.target, axis=1) < 1e-6
     assert right.sum() > 50
     # those whose partner the target has not seen are matched to something else
     assert right.mean() > 0.5
     with pytest.raises(InputError, match='expected arrays points and descriptors'):
-        front_end.Features(tmp_path / 'none').read(task.source)
+        front_end.Features(tmp_path / 'none').read(pair.source)
 
 
 def test_depth_map_by_hand(tmp_path):
@@ -268,9 +266,9 @@ def test_depth_map_by_hand(tmp_path):
         np.savetxt(tmp_path / f'frame-{i:06d}.pose.txt',
                    se3.compose(np.eye(3), np.array([0.1 * i, 0, 0])))
     protocol = depth_frames(tmp_path, 2)
-    task, = protocol.tasks
-    assert task.T_target_source[:3, 3] == pytest.approx([0.2, 0, 0])
-    scan = task.source.read()
+    pair, = protocol.pairs
+    assert pair.T_target_source[:3, 3] == pytest.approx([0.2, 0, 0])
+    scan = pair.source.read()
     assert scan.points == pytest.approx(points)
     assert scan.labels.tolist() == [9, 9]
 
@@ -280,8 +278,8 @@ def test_depth_map_by_hand(tmp_path):
 def test_matches_from_files(tmp_path, names, inlier, count):
     """The shared sets, thinned by a study too."""
     protocol = given_matches(DATA / 'correspondences', names, inlier)
-    found = run(protocol, [Entry('m', centroid)], tmp_path,
-                variants=[front_end.Variant('all'), front_end.Variant('9', matches=9)])
+    found = run(protocol, [Method('m', on_matches=centroid)], tmp_path,
+                variants=[studies.Variant('all'), studies.Variant('9', matches=9)])
     assert len(found) == 2 * count
     assert all(r.matches > 4000 and r.right_share > 0.008 for r in found[:count])
     assert {r.matches for r in found[count:]} == {9}
@@ -292,11 +290,11 @@ def test_3dmatch_runs_to_its_end(tmp_path):
     """The pair that is here, with the truth of its log, by SC2-PCR."""
     from sgor_ros.evaluation.methods.sc2_pcr import sc2_pcr
     protocol = threedmatch(DATA / 'indoor')
-    task, = protocol.tasks
-    assert (task.name, task.group) == ('7-scenes-redkitchen 4 0', '7-scenes-redkitchen')
+    pair, = protocol.pairs
+    assert (pair.name, pair.group) == ('7-scenes-redkitchen 4 0', '7-scenes-redkitchen')
     assert protocol.missing > 100
-    found, = run(protocol, [Entry('SC2-PCR', sc2_pcr)], tmp_path)
-    assert found.within(protocol.thresholds[0])
+    found, = run(protocol, [Method('SC2-PCR', on_matches=sc2_pcr)], tmp_path)
+    assert found.within
 
 
 @needs_data
@@ -305,14 +303,14 @@ def test_refined_truth_is_kept(tmp_path):
     from sgor_ros.io.datasets import open_drives
     drive, = open_drives(DATA / 'kitti/08')
     T = drive.T_world_sensor
-    task = strided([replace(drive, T_world_sensor=T[:len(drive.frames)])], [3]).tasks[0]
-    off = replace(task, T_target_source=se3.compose(np.eye(3), np.array([0.05, 0.05, 0.0]))
-                  @ task.T_target_source)
+    pair = strided([replace(drive, T_world_sensor=T[:len(drive.frames)])], [3]).pairs[0]
+    off = replace(pair, T_target_source=se3.compose(np.eye(3), np.array([0.05, 0.05, 0.0]))
+                  @ pair.T_target_source)
     cache = tmp_path / 'truth.json'
-    first, = refined([task], cache)
+    first, = refined([pair], cache)
     again, = refined([off], tmp_path / 'other.json')
     assert np.linalg.norm(first.T_target_source[:3, 3] - again.T_target_source[:3, 3]) < 0.02
-    kept, = refined([replace(task, source=None)], cache)
+    kept, = refined([replace(pair, source=None)], cache)
     assert kept.T_target_source == pytest.approx(first.T_target_source)
 
 
@@ -368,5 +366,5 @@ def test_what_the_command_refuses(tmp_path, arguments, says):
 
 def test_matches_can_be_sent_to_another_process():
     with multiprocessing.get_context('spawn').Pool(1) as pool:
-        solution, = pool.map(centroid, [Matches.of(np.zeros((4, 3)), np.ones((4, 3)), 0.6)])
-    assert solution.T_target_source[:3, 3] == pytest.approx([1, 1, 1])
+        answer, = pool.map(centroid, [Matches.of(np.zeros((4, 3)), np.ones((4, 3)), 0.6)])
+    assert answer.T_target_source[:3, 3] == pytest.approx([1, 1, 1])

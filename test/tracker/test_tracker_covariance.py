@@ -2,14 +2,14 @@
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from sgor_ros.evaluation.honesty import track_consistency
 
 from sgor_ros import SemanticScan
 from sgor_ros import Tracker
 from sgor_ros import TrackerConfig
 from sgor_ros.core.common import se3
-from sgor_ros.evaluation.honesty import what_was_said
-from sgor_ros.evaluation.metrics import squared_normalised_error
-from sgor_ros.evaluation.metrics import THREE_SIGMA
+from sgor_ros.evaluation.metrics import nees
+from sgor_ros.evaluation.metrics import NEES_BOUND
 from sgor_ros.tracker.covariance import CORRELATION_LENGTHS_M
 from sgor_ros.tracker.covariance import PoseCovariance
 from sgor_ros.tracker.covariance import square_root
@@ -101,11 +101,11 @@ def test_errors_are_as_large_as_is_claimed(mode, speed):
             np.linalg.cholesky(result.covariance)
             off = result.twist - se3.log(se3.inverse(truth[-2]) @ T) / 0.1
             twist.append(off @ np.linalg.solve(result.twist_covariance, off))
-    said = what_was_said(tracked, np.array(truth))[1:]
+    said = track_consistency(tracked, np.array(truth))[1:]
     relative = [scan.step_nees for scan in said]
     absolute = [scan.pose_nees for scan in said]
     for distances in (relative, absolute, twist):
-        assert max(distances) < THREE_SIGMA
+        assert max(distances) < NEES_BOUND
         assert 0.2 < np.mean(distances) < 10
 
 
@@ -115,8 +115,8 @@ def test_nees_of_right_covariances_is_six():
     covariance = next(covariances(rng))
     for factor, expected in ((1.0, 6.0), (2.0, 24.0)):
         noise = factor * rng.multivariate_normal(np.zeros(6), covariance, 2000)
-        found = [squared_normalised_error(T, STEPS[0], covariance)
+        found = [nees(T, STEPS[0], covariance)
                  for T in perturbed(STEPS[0], noise)]
         assert np.mean(found) == pytest.approx(expected, rel=0.06)
         if factor == 1.0:
-            assert np.mean(np.array(found) < THREE_SIGMA) == pytest.approx(0.997, abs=0.003)
+            assert np.mean(np.array(found) < NEES_BOUND) == pytest.approx(0.997, abs=0.003)

@@ -1,13 +1,13 @@
 """`sgor_benchmark ablation`: every mechanism off, one at a time."""
 from argparse import ArgumentParser
 from argparse import Namespace
-from dataclasses import asdict
 from pathlib import Path
 
-from ...evaluation import ablation as ablations
-from ...evaluation import plots
-from ...evaluation import report
-from ...evaluation import run as running
+from ...evaluation.metrics.row import scan_records
+from ...evaluation.protocols import ablation as ablations
+from ...evaluation.report import plots
+from ...evaluation.report import tables
+from ...evaluation.runner import run_pairs
 from . import inputs
 from .numbers import positive
 
@@ -27,13 +27,13 @@ def measure(arguments: Namespace, folder: Path) -> None:
     """Turn the mechanisms off, one at a time, as the paper does and ours too."""
     methods = ablations.methods(arguments.cores, only_paper=arguments.paper)
     right = inputs.right_pairs(arguments, inputs.drives_of(arguments), arguments.pairs)
-    rows = running.run_pairs(right, methods, arguments.seed)
+    rows = run_pairs(right, methods, arguments.seed)
     names = [method.name for method in methods]
     counts = {data_set: sum(pair.data_set == data_set for pair in right)
               for data_set in sorted({pair.data_set for pair in right})}
-    text = (f'{report.ablation_table(rows, names)}\n\n{ablations.paper_table(rows)}\n\n'
+    text = (f'{tables.ablation_table(rows, names)}\n\n{tables.paper_table(rows)}\n\n'
             f'{len(right)} pairs ('
             + ', '.join(f'{count} {name}' for name, count in counts.items())
-            + f'); the paper: 555 of KITTI, 9.5 m apart. {report.RULE}')
-    inputs.finish(arguments, folder, text, [asdict(row) for row in rows], len(right))
+            + f'); the paper: 555 of KITTI, 9.5 m apart. {tables.RULE}')
+    inputs.finish(arguments, folder, text, scan_records(rows), len(right))
     plots.plot_ablation(folder / 'plot.png', rows, names)

@@ -9,9 +9,9 @@ from typing import Any
 
 from ...core.common.settings import InputError
 from ...core.config import SgorConfig
-from ...evaluation import pairs as pairing
-from ...evaluation import report
-from ...evaluation.pairs import Pair
+from ...evaluation.output import save
+from ...evaluation.protocols import pairs as pairing
+from ...evaluation.protocols.pairs import Pair
 from ...io.datasets import Drive
 from ...io.datasets import open_drives
 
@@ -86,7 +86,7 @@ def finish(arguments: Namespace, folder: Path, text: str, records: list[dict[str
            right: int = 0, wrong: int = 0) -> None:
     """Print the table and write it with its rows and what it was made with."""
     print(text)
-    report.save(folder, text, records, {
+    save(folder, text, records, {
         'options': vars(arguments), 'right_pairs': right, 'wrong_pairs': wrong,
         'config': asdict(default_config(arguments))})
 

@@ -1,16 +1,20 @@
 """`sgor_benchmark pairs`: methods on the same pairs."""
 from argparse import ArgumentParser
 from argparse import Namespace
-from dataclasses import asdict
 from pathlib import Path
 
 from ...core.common.settings import InputError
-from ...evaluation import pairs as pairing
-from ...evaluation import plots
-from ...evaluation import report
-from ...evaluation import run as running
-from ...evaluation.run import Method
-from ...evaluation.run import sgor
+from ...evaluation.job import turned
+from ...evaluation.memory import peak_memory_mb
+from ...evaluation.methods import available
+from ...evaluation.methods import Method
+from ...evaluation.methods import ON_SCANS
+from ...evaluation.methods import sgor
+from ...evaluation.metrics.row import scan_records
+from ...evaluation.protocols import pairs as pairing
+from ...evaluation.report import plots
+from ...evaluation.report import tables
+from ...evaluation.runner import run_pairs
 from . import inputs
 from .numbers import count
 from .numbers import positive
@@ -39,17 +43,17 @@ def measure(arguments: Namespace, folder: Path) -> None:
     drives = inputs.drives_of(arguments)
     right = inputs.right_pairs(arguments, drives, arguments.limit)
     wrong = pairing.wrong_pairs(drives, arguments.wrong, arguments.seed)
-    rows = running.run_pairs(right, methods, arguments.seed)
+    rows = run_pairs(right, methods, arguments.seed)
     refusing = [method for method in methods if method.refuses]
     if wrong and refusing:
-        rows += running.run_pairs(wrong, refusing, arguments.seed)
-    memory = running.peak_memory_mb(methods, running.sample_of(right[0], arguments.seed)[0])
+        rows += run_pairs(wrong, refusing, arguments.seed)
+    memory = peak_memory_mb(methods, turned(right[0], arguments.seed)[0])
     names = [method.name for method in methods]
     text = '\n\n'.join((
-        report.pairs_table(rows, names, memory), report.data_sets_table(rows, names), report.RULE
+        tables.pairs_table(rows, names, memory), tables.data_sets_table(rows, names), tables.RULE
         + ' Peak memory: of a process of its own for each method, its libraries included; '
         f'{memory[""]:.0f} MB of it are Python with numpy, scipy, numba and the two scans.'))
-    inputs.finish(arguments, folder, text, [asdict(row) for row in rows], len(right), len(wrong))
+    inputs.finish(arguments, folder, text, scan_records(rows), len(right), len(wrong))
     plots.plot_pairs(folder / 'plot.png', rows, names)
 
 
@@ -57,7 +61,7 @@ def _methods(arguments: Namespace) -> list[Method]:
     config = inputs.default_config(arguments)
     known = {'sgor': sgor('SGOR', config),
              'paper': sgor("SGOR, paper's settings", inputs.paper_config(arguments)),
-             **running.rivals(inputs.say)}
+             **available(ON_SCANS, inputs.say)}
     for name in arguments.methods or ():
         if name not in known:
             raise InputError(f'--methods {name}: not one of {", ".join(known)}')

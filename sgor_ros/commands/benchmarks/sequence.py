@@ -4,11 +4,12 @@ from argparse import Namespace
 from pathlib import Path
 
 from ...core.common.settings import InputError
-from ...evaluation import plots
-from ...evaluation import report
-from ...evaluation import sequences
-from ...evaluation.honesty_table import honesty_table
-from ...evaluation.honesty_table import RULE
+from ...evaluation.methods import odometries
+from ...evaluation.report import plots
+from ...evaluation.report import tables
+from ...evaluation.report.consistency_table import consistency_table
+from ...evaluation.report.consistency_table import RULE
+from ...evaluation.sequences import run_drive
 from ...io.datasets import Drive
 from ..scene_pairs import scene_drive
 from ..scene_pairs import scene_kinds
@@ -43,13 +44,13 @@ def measure(arguments: Namespace, folder: Path) -> None:
     if not drives and not kinds:
         raise InputError(f'{arguments.data or "world"}: no drive with two scans and poses.txt, '
                          'good in z')
-    makers = sequences.odometries(config, inputs.say, unlabelled=arguments.no_labels)
-    tracks = [track for drive in drives for track in sequences.run_drive(drive, makers, config)]
-    makers = sequences.trackers(config, unlabelled=arguments.no_labels)
+    makers = odometries.odometries(config, inputs.say, unlabelled=arguments.no_labels)
+    tracks = [track for drive in drives for track in run_drive(drive, makers, config)]
+    makers = odometries.trackers(config, unlabelled=arguments.no_labels)
     for number, kind in enumerate(kinds, 1):
         inputs.say(f'{kind}, {number} of {len(kinds)} kinds: scanning')
         drive = scene_drive(kind, arguments.per_kind, arguments.seed)
-        tracks += sequences.run_drive(drive, makers, config)
-    text = '\n\n'.join((report.sequence_table(tracks), honesty_table(tracks), RULE))
-    inputs.finish(arguments, folder, text, report.scan_records(tracks))
+        tracks += run_drive(drive, makers, config)
+    text = '\n\n'.join((tables.sequence_table(tracks), consistency_table(tracks), RULE))
+    inputs.finish(arguments, folder, text, tables.scan_records(tracks))
     plots.plot_sequences(folder / 'plot.png', tracks)

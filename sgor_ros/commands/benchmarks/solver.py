@@ -2,21 +2,23 @@
 from argparse import ArgumentParser
 from argparse import Namespace
 from dataclasses import asdict
-import importlib.util
 from pathlib import Path
 
 from ...core.common.settings import InputError
-from ...evaluation import plots
-from ...evaluation import report
-from ...evaluation import run as running
 from ...evaluation import solver
+from ...evaluation.methods import available
+from ...evaluation.methods import ON_MATCHES
+from ...evaluation.protocols.pairs import Pair
+from ...evaluation.report import plots
+from ...evaluation.report.tables import solver_table
 from . import inputs
 from .numbers import count
 from .numbers import positive
 from .numbers import share
 
 HELP = 'time of the solver on made-up matches, and on those of the FPFH of your scans'
-DENSE_REFERENCE = Path(__file__).parents[3] / 'test/dense_reference.py'
+OTHER = "KISS-Matcher's solver"
+"""Besides SGOR's, the one that is quick enough for so many matches."""
 
 
 def add_options(command: ArgumentParser) -> None:
@@ -36,21 +38,20 @@ def add_options(command: ArgumentParser) -> None:
 
 def measure(arguments: Namespace, folder: Path) -> None:
     """Time the solver on made-up matches, and on those of the FPFH of scans."""
-    sets = [solver.made_up(count, arguments.inlier_share, arguments.seed)
-            for count in arguments.counts]
-    small = [matches for matches in sets if len(matches.source) <= arguments.dense_limit]
-    rows = solver.run_solver([*sets, *_of_scans(arguments)], inputs.default_config(arguments),
-                             arguments.runs, rivals=running.installed('kiss_matcher', inputs.say))
-    dense = _dense_reference()
-    if dense is None:
-        inputs.say('no dense reference here: it is part of the tests, which are not installed')
-    elif small:
-        rows += solver.run_dense(small, dense)
-    inputs.finish(arguments, folder, report.solver_table(rows), [asdict(row) for row in rows])
+    made_up = [solver.made_up(count, arguments.inlier_share, arguments.seed)
+               for count in arguments.counts]
+    others = available({OTHER: ON_MATCHES[OTHER]}, inputs.say)
+    rows = solver.run_solver([*made_up, *_of_scans(arguments)], inputs.default_config(arguments),
+                             arguments.runs, list(others.values()))
+    small = [pair for count, pair in zip(arguments.counts, made_up, strict=True)
+             if count <= arguments.dense_limit]
+    if small:
+        rows += solver.run_dense(small)
+    inputs.finish(arguments, folder, solver_table(rows), [asdict(row) for row in rows])
     plots.plot_solver(folder / 'plot.png', rows)
 
 
-def _of_scans(arguments: Namespace) -> list[solver.Matches]:
+def _of_scans(arguments: Namespace) -> list[Pair]:
     """Return the matches in the folder of the user, and those of pairs of scans."""
     if not arguments.data and not arguments.world:
         return []
@@ -62,16 +63,3 @@ def _of_scans(arguments: Namespace) -> list[solver.Matches]:
             raise
         return given
     return [*solver.fpfh_matches(pairs, arguments.fpfh_matches), *given]
-
-
-def _dense_reference() -> solver.Dense | None:
-    """Return the reference of the tests where this is a checkout."""
-    if not DENSE_REFERENCE.is_file():
-        return None
-    spec = importlib.util.spec_from_file_location('dense_reference', DENSE_REFERENCE)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    found: solver.Dense = module.solve
-    return found

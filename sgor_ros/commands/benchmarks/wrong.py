@@ -1,20 +1,20 @@
 """`sgor_benchmark wrong`: what is claimed and wrong, and what is known not to be known."""
 from argparse import ArgumentParser
 from argparse import Namespace
-from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
 
 from ...core.common.settings import InputError
-from ...evaluation import pairs as pairing
-from ...evaluation import plots
-from ...evaluation import report
-from ...evaluation import run as running
-from ...evaluation import trust
-from ...evaluation.pairs import Pair
-from ...evaluation.run import sgor
-from ...evaluation.trust_plots import plot_reliability
+from ...evaluation.methods import sgor
+from ...evaluation.metrics.row import scan_records
+from ...evaluation.protocols import pairs as pairing
+from ...evaluation.protocols.pairs import Pair
+from ...evaluation.report import outcomes
+from ...evaluation.report import plots
+from ...evaluation.report.reliability_diagram import plot_reliability_diagram
+from ...evaluation.report.tables import confidence_table
+from ...evaluation.runner import run_pairs
 from ..scene_pairs import scene_kinds
 from ..scene_pairs import scene_pairs
 from . import inputs
@@ -45,10 +45,10 @@ def measure(arguments: Namespace, folder: Path) -> None:
              if inputs.wants_world(arguments) and arguments.per_kind else {})
     rows, texts = [], []
     if arguments.limit or arguments.count:
-        rows = running.run_pairs(_right_and_wrong(arguments), methods, arguments.seed)
+        rows = run_pairs(_right_and_wrong(arguments), methods, arguments.seed)
         labelled = [row for row in rows if row.method == names[0]]
         thresholds = sorted({*np.arange(0.4, 1.0, 0.05).round(2), config.min_confidence})
-        texts.append(report.confidence_table(labelled, thresholds, config.min_confidence)
+        texts.append(confidence_table(labelled, thresholds, config.min_confidence)
                      + f'\n\n{sum(row.right for row in labelled)} right and '
                      f'{sum(not row.right for row in labelled)} wrong pairs. Answers that the '
                      'default threshold refused keep the confidence that they were refused with.')
@@ -56,24 +56,24 @@ def measure(arguments: Namespace, folder: Path) -> None:
         raise InputError('--limit 0 --count 0: nothing is left to do without --per-kind')
     for number, kind in enumerate(kinds, 1):
         inputs.say(f'{kind}, {number} of {len(kinds)} kinds: scanning')
-        rows += running.run_pairs(scene_pairs(kind, arguments.per_kind, arguments.seed), methods,
+        rows += run_pairs(scene_pairs(kind, arguments.per_kind, arguments.seed), methods,
                                   arguments.seed)
     repeating = [kind for kind, repeats in kinds.items() if repeats]
-    texts += [trust.trust_table(rows, names, repeating), trust.RULE,
-              trust.verdicts(rows, names), trust.reliability_table(rows, names)]
+    texts += [outcomes.outcome_table(rows, names, repeating), outcomes.RULE,
+              outcomes.wrong_claims(rows, names), outcomes.reliability_table(rows, names)]
     right = sum(row.right for row in rows) // len(methods)
-    inputs.finish(arguments, folder, '\n\n'.join(texts), [asdict(row) for row in rows], right,
+    inputs.finish(arguments, folder, '\n\n'.join(texts), scan_records(rows), right,
                   len(rows) // len(methods) - right)
     if arguments.limit or arguments.count:
         plots.plot_confidence(folder / 'confidence.png', labelled, config.min_confidence)
-    plot_reliability(folder / 'reliability.png', rows, names, config.min_confidence)
+    plot_reliability_diagram(folder / 'reliability.png', rows, names, config.min_confidence)
 
 
 def _right_and_wrong(arguments: Namespace) -> list[Pair]:
     drives = inputs.drives_of(arguments)
     right = inputs.right_pairs(arguments, drives, arguments.limit) if arguments.limit else []
-    strangers = pairing.wrong_pairs(drives, arguments.count, arguments.seed)
-    if arguments.count and not strangers:
+    different = pairing.wrong_pairs(drives, arguments.count, arguments.seed)
+    if arguments.count and not different:
         raise InputError('no wrong pairs: they need two drives, or one longer than '
                          f'{pairing.NO_OVERLAP_M:g} m; add --world')
-    return right + strangers
+    return right + different

@@ -17,9 +17,9 @@ from .compatibility import with_values
 from .compatibility import without_diagonal
 from .consensus import best
 from .consensus import refined
-from .problem import INDOOR_M
-from .problem import Matches
-from .problem import Solution
+from .interface import Answer
+from .interface import INDOOR_M
+from .interface import Matches
 
 Array = NDArray[np.float64]
 
@@ -30,7 +30,7 @@ MOST_CORE, THINNING = 64, 0.5
 can be listed: this share of the edges stays, the strongest."""
 
 
-def mac(matches: Matches) -> Solution:
+def mac(matches: Matches) -> Answer:
     """Fit to each clique that is the heaviest of a match, and take the best."""
     least = LEAST_INDOOR if matches.inlier_m <= INDOOR_M else LEAST_OUTDOOR
     limit = matches.inlier_m * np.sqrt(1 - least)
@@ -39,7 +39,7 @@ def mac(matches: Matches) -> Solution:
     second = (first @ first) * first
     cliques = _selected(csr_array(second))
     if not cliques:
-        return Solution(None)
+        return Answer(None)
     T = np.concatenate([
         fit_transforms(matches.source[sets], matches.target[sets], np.ones(sets.shape))
         for sets in cliques])
@@ -47,7 +47,7 @@ def mac(matches: Matches) -> Solution:
     def score(r: Array) -> float:
         return float(np.maximum(0, 1 - r / matches.inlier_m).sum())
 
-    return Solution(refined(matches, best(matches, T, score), matches.inlier_m))
+    return Answer(refined(matches, best(matches, T, score), matches.inlier_m))
 
 
 def without_zeros(c: csr_array) -> csr_array:

@@ -14,9 +14,9 @@ from .compatibility import length_differences
 from .compatibility import with_values
 from .consensus import best
 from .consensus import refined
-from .problem import INDOOR_M
-from .problem import Matches
-from .problem import Solution
+from .interface import Answer
+from .interface import INDOOR_M
+from .interface import Matches
 
 Array = NDArray[np.float64]
 
@@ -29,13 +29,13 @@ REFINED_OUTDOOR_M = 1.2
 SEEDS_AT_ONCE = 256
 
 
-def sc2_pcr(matches: Matches) -> Solution:
+def sc2_pcr(matches: Matches) -> Answer:
     """Consensus sets by second-order spatial compatibility, grown from seeds; the best wins."""
     n = len(matches.source)
     indoor = matches.inlier_m <= INDOOR_M
     rounds = ROUNDS_INDOOR if indoor else ROUNDS_OUTDOOR
     if n < SECOND:
-        return Solution(None)
+        return Answer(None)
     c = length_differences(matches.source, matches.target, LENGTH_LIMIT_M)
     soft = with_values(c, 1 - (c.data / LENGTH_LIMIT_M)**2)
     hard = with_values(c, np.ones_like(c.data))
@@ -44,7 +44,7 @@ def sc2_pcr(matches: Matches) -> Solution:
     T = np.concatenate([_hypotheses(matches, some, hard, tight, rounds) for some in
                         np.array_split(seeds, -(-len(seeds) // SEEDS_AT_ONCE))])
     chosen = best(matches, T, lambda r: float(np.count_nonzero(r < matches.inlier_m)))
-    return Solution(refined(matches, chosen, matches.inlier_m if indoor else REFINED_OUTDOOR_M))
+    return Answer(refined(matches, chosen, matches.inlier_m if indoor else REFINED_OUTDOOR_M))
 
 
 def _seeds(source: Array, confidence: Array, radius: float) -> NDArray[np.intp]:

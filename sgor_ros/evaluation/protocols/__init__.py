@@ -1,5 +1,5 @@
-"""The protocols of the literature: which pairs, which matches, which thresholds, which tables.
+"""The protocols of the literature: which pairs, which thresholds.
 
-`kitti`, `indoor` and `drives` make protocols; `front_end` the matches that all methods share;
-`run` runs them; `tables`, `plots` and `page` show what came out beside `published` rows.
+`pairs` are those of any drives, `kitti`, `indoor`, `drives` and `match_files` make protocols of
+them; `studies` and `ablation` are what is varied; `truth` refines poses by ICP.
 """

@@ -12,10 +12,10 @@ from ...core.config import SgorConfig
 from ...core.scan.scan import SemanticScan
 from ...io.datasets import Frame
 from ...io.scans import read_scan
-from ..methods.problem import INDOOR_M
-from .task import INDOOR
-from .task import Protocol
-from .task import Task
+from ..methods.interface import INDOOR_M
+from ..metrics.registration_recall import INDOOR
+from .pairs import Pair
+from .protocol import Protocol
 
 Array = NDArray[np.float64]
 
@@ -30,7 +30,7 @@ def threedmatch(folder: Path, logs: str = '*gt.log') -> Protocol:
     ``SCENE_gt.log``. Neighbours, whose fragments follow each other, do not count, as in the
     benchmark.
     """
-    tasks: list[Task] = []
+    pairs: list[Pair] = []
     missing = 0
     found = sorted({*folder.rglob(logs)})
     if not found:
@@ -43,11 +43,11 @@ def threedmatch(folder: Path, logs: str = '*gt.log') -> Protocol:
             if j - i <= 1:
                 continue
             if source.is_file() and target.is_file():
-                tasks.append(Task(f'{scene} {j} {i}', scene, _fragment(source),
-                                  _fragment(target), T))
+                pairs.append(Pair(_fragment(source), _fragment(target), T,
+                                  name=f'{scene} {j} {i}', group=scene))
             else:
                 missing += 1
-    return Protocol('3dmatch', tasks, (INDOOR,), INDOOR_M, SgorConfig.indoor().paper_steps(),
+    return Protocol('3dmatch', pairs, (INDOOR,), INDOOR_M, SgorConfig.indoor().paper_steps(),
                     missing)
 
 
@@ -75,14 +75,14 @@ def depth_frames(folder: Path, stride: int) -> Protocol:
     if intrinsics is None or not depths:
         raise InputError(f'{folder}: expected frame-*.depth.png and camera-intrinsics.txt')
     K = np.loadtxt(intrinsics)
-    tasks = []
+    pairs = []
     for target, source in zip(depths, depths[stride:], strict=False):
         T_i, T_j = (np.loadtxt(str(path).replace('.depth.png', '.pose.txt'))
                     for path in (target, source))
         name = f'{folder.name} {source.name[6:12]} {target.name[6:12]}'
-        tasks.append(Task(name, folder.name, _depth(source, K), _depth(target, K),
-                          se3.inverse(T_i) @ T_j))
-    return Protocol('depth_frames', tasks, (INDOOR,), INDOOR_M,
+        pairs.append(Pair(_depth(source, K), _depth(target, K), se3.inverse(T_i) @ T_j, name=name,
+                          group=folder.name))
+    return Protocol('depth_frames', pairs, (INDOOR,), INDOOR_M,
                     SgorConfig.indoor().paper_steps())
 
 

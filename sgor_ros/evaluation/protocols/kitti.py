@@ -15,12 +15,12 @@ from ...core.common.settings import InputError
 from ...core.config import SgorConfig
 from ...io.datasets import Drive
 from ...io.datasets import Frame
-from .task import EASY
-from .task import HARD
-from .task import LOOPS
-from .task import MEDIUM
-from .task import Protocol
-from .task import Task
+from ..metrics.registration_recall import EASY
+from ..metrics.registration_recall import HARD
+from ..metrics.registration_recall import LOOPS
+from ..metrics.registration_recall import MEDIUM
+from .pairs import Pair
+from .protocol import Protocol
 
 Array = NDArray[np.float64]
 
@@ -84,49 +84,49 @@ def kitti_10m(drives: Sequence[Drive], positions: Sequence[Array]) -> Protocol:
     positions : sequence of (N, 3) float64
         Where the rule is to be applied: the camera's, or the sensor's where that is all there is.
     """
-    tasks = []
+    pairs = []
     for drive, where in zip(drives, positions, strict=True):
         assert drive.T_world_sensor is not None
         T = drive.T_world_sensor
-        tasks += [Task(f'{drive.name} {i} {j}', drive.name, drive.frames[i], drive.frames[j],
-                       se3.inverse(T[j]) @ T[i])
+        pairs += [Pair(drive.frames[i], drive.frames[j], se3.inverse(T[j]) @ T[i],
+                       name=f'{drive.name} {i} {j}', group=drive.name)
                   for i, j in ten_metre_pairs(where[:len(drive.frames)])
                   if (drive.name.rpartition('/')[2], i, j) != (f'{KNOWN_BAD[0]:02d}',
                                                               *KNOWN_BAD[1:])]
-    return _strict('kitti_10m', tasks, 0)
+    return _strict('kitti_10m', pairs, 0)
 
 
 def kitti_10m_list(path: Path, find: Finder) -> Protocol:
     """Return the pairs of a list of the 10 m kind, without the one that is known to be bad."""
     listed = [row for row in read_pair_list(path) if (row[0], row[1], row[3]) != KNOWN_BAD]
-    tasks, missing = _tasks(listed, find, lambda sequence: f'{sequence:02d}')
-    return _strict('kitti_10m', tasks, missing)
+    pairs, missing = _listed(listed, find, lambda sequence: f'{sequence:02d}')
+    return _strict('kitti_10m', pairs, missing)
 
 
 def kitti_loops(paths: Sequence[Path], find: Finder) -> Protocol:
     """Return the pairs of lists of loops, each list a band of distance."""
-    tasks: list[Task] = []
+    pairs: list[Pair] = []
     missing = 0
     for path in paths:
         band = path.stem.removeprefix('kitti_loops_').replace('_', '-') + ' m'
-        found, gone = _tasks(read_pair_list(path), find, lambda _, band=band: band)    # type: ignore[misc]
-        tasks += found
+        found, gone = _listed(read_pair_list(path), find, lambda _, band=band: band)    # type: ignore[misc]
+        pairs += found
         missing += gone
-    return Protocol('kitti_loops', tasks, (LOOPS, EASY), INLIER_M, SgorConfig.kitti_protocol(),
+    return Protocol('kitti_loops', pairs, (LOOPS, EASY), INLIER_M, SgorConfig.kitti_protocol(),
                     missing)
 
 
-def _strict(name: str, tasks: Sequence[Task], missing: int) -> Protocol:
-    return Protocol(name, tasks, (EASY, MEDIUM, HARD), INLIER_M, SgorConfig.kitti_protocol(),
+def _strict(name: str, pairs: Sequence[Pair], missing: int) -> Protocol:
+    return Protocol(name, pairs, (EASY, MEDIUM, HARD), INLIER_M, SgorConfig.kitti_protocol(),
                     missing)
 
 
-def _tasks(rows: Sequence[tuple[int, int, int, int, Array]], find: Finder,
-           group: Callable[[int], str]) -> tuple[list[Task], int]:
-    tasks = []
+def _listed(rows: Sequence[tuple[int, int, int, int, Array]], find: Finder,
+           group: Callable[[int], str]) -> tuple[list[Pair], int]:
+    pairs = []
     for sequence, i, other, j, T in rows:
         source, target = find(sequence, i), find(other, j)
         if source is not None and target is not None:
-            tasks.append(Task(f'{sequence:02d} {i} {other:02d} {j}', group(sequence), source,
-                              target, T))
-    return tasks, len(rows) - len(tasks)
+            pairs.append(Pair(source, target, T, name=f'{sequence:02d} {i} {other:02d} {j}',
+                              group=group(sequence)))
+    return pairs, len(rows) - len(pairs)

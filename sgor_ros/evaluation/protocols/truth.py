@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from ...core.common.settings import InputError
-from .task import Task
+from .pairs import Pair
 
 Array = NDArray[np.float64]
 
@@ -18,22 +18,22 @@ VOXEL_M, REACH_M, ROUNDS = 0.05, 0.2, 200
 """Point-to-point ICP of clouds thinned to this, from the poses on."""
 
 
-def refined(tasks: Iterable[Task], cache: Path) -> list[Task]:
-    """Return tasks with refined truths; what is in the cache is not computed again.
+def refined(pairs: Iterable[Pair], cache: Path) -> list[Pair]:
+    """Return pairs with refined truths; what is in the cache is not computed again.
 
     The pose of ICP moves what the first pose has moved: A T. The reverse product, which the
     original script has, is off by some 2 cm at 10 m.
     """
     known = _read(cache)
     done = []
-    for task in tqdm(list(tasks), 'ground truth', unit='pair', disable=None):
-        if task.name not in known:
-            known[task.name] = _icp(task).tolist()
+    for pair in tqdm(list(pairs), 'ground truth', unit='pair', disable=None):
+        if pair.name not in known:
+            known[pair.name] = _icp(pair).tolist()
             cache.parent.mkdir(parents=True, exist_ok=True)
             beside = cache.with_suffix('.part')
             beside.write_text(json.dumps(known))
             beside.replace(cache)
-        done.append(replace(task, T_target_source=np.array(known[task.name])))
+        done.append(replace(pair, T_target_source=np.array(known[pair.name])))
     return done
 
 
@@ -47,18 +47,18 @@ def _read(cache: Path) -> dict[str, Any]:
     return known
 
 
-def _icp(task: Task) -> Array:
+def _icp(pair: Pair) -> Array:
     import open3d as o3d
+    truth = pair.T_target_source
+    assert truth is not None
     registration = o3d.pipelines.registration
-    assert task.source is not None
-    assert task.target is not None
     source, target = (o3d.geometry.PointCloud(o3d.utility.Vector3dVector(
         frame.read().points.astype(np.float64))).voxel_down_sample(VOXEL_M)
-        for frame in (task.source, task.target))
-    source.transform(task.T_target_source)
+        for frame in pair.scans)
+    source.transform(truth)
     found = registration.registration_icp(
         source, target, REACH_M, np.eye(4),
         registration.TransformationEstimationPointToPoint(False),
         registration.ICPConvergenceCriteria(max_iteration=ROUNDS))
-    T: Array = np.asarray(found.transformation) @ task.T_target_source
+    T: Array = np.asarray(found.transformation) @ truth
     return T

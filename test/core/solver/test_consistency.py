@@ -1,7 +1,6 @@
 """The sparse compiled path against the dense reference of the paper's equations."""
 import tracemalloc
 
-import dense_reference as dense
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -14,6 +13,7 @@ from sgor_ros.core.solver.consistency import label_agreement
 from sgor_ros.core.solver.graph import consistency_graph
 from sgor_ros.core.solver.grouping import group
 from sgor_ros.core.solver.grouping import leading_eigenvector
+from sgor_ros.evaluation import dense_reference as dense
 
 CUTOFFS = (1.0, 6.0)
 PAPER = SgorConfig.paper()

@@ -1,5 +1,4 @@
 """Key correspondences and their groups, against plain Python."""
-import dense_reference as dense
 import numpy as np
 import pytest
 from test_consistency import random_matches
@@ -8,6 +7,7 @@ from sgor_ros import SgorConfig
 from sgor_ros.core.solver.graph import consistency_graph
 from sgor_ros.core.solver.grouping import group
 from sgor_ros.core.solver.grouping import leading_eigenvector
+from sgor_ros.evaluation import dense_reference as dense
 
 
 @pytest.mark.parametrize('spacing', [0.0, 5.0, 15.0, 20.0])

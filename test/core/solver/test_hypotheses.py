@@ -1,5 +1,4 @@
 """Weighted SVD of the groups and the refinement on all matches, against the dense reference."""
-import dense_reference as dense
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -11,6 +10,7 @@ from sgor_ros.core.solver.hypotheses import fit_transforms
 from sgor_ros.core.solver.hypotheses import hypothesise
 from sgor_ros.core.solver.refinement import distances
 from sgor_ros.core.solver.refinement import refine
+from sgor_ros.evaluation import dense_reference as dense
 
 
 def random_pose(seed):

@@ -1,7 +1,6 @@
 """`SgorConfig.paper()` from points to transformation: the dense reference of Eq. 2 to 20."""
 from conftest import errors
 from conftest import relative
-import dense_reference as dense
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -15,6 +14,7 @@ from sgor_ros.core.features.descriptors import fpfh
 from sgor_ros.core.features.descriptors import normals
 from sgor_ros.core.features.neighbours import radius_neighbours
 from sgor_ros.core.scan.labels import label_convention
+from sgor_ros.evaluation import dense_reference as dense
 
 PAPER = SgorConfig.paper()
 CONVENTION = label_convention(PAPER.label_convention)

@@ -1,7 +1,6 @@
 """Two-stage verification: ground normals, then truncated distance (Sec. III-D)."""
 import math
 
-import dense_reference as dense
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -13,6 +12,7 @@ from sgor_ros.core.solver.hypotheses import Hypotheses
 from sgor_ros.core.solver.verification import ground_angles
 from sgor_ros.core.solver.verification import truncated_distance
 from sgor_ros.core.solver.verification import verify
+from sgor_ros.evaluation import dense_reference as dense
 
 UP = np.array([0, 0, 1.0])
 
