@@ -5,19 +5,24 @@ import json
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
-from sgor_ros.evaluation.ablation import PAPER_ROWS
-from sgor_ros.evaluation.pairs import Pair
-from sgor_ros.evaluation.rivals import Answer
-from sgor_ros.evaluation.run import Method
-from sgor_ros.evaluation.run import Row
-from sgor_ros.evaluation.run import run_pairs
-from sgor_ros.evaluation.run import sgor
 
 from sgor_ros.commands.benchmark import main
 from sgor_ros.core.config import SgorConfig
-from sgor_ros.evaluation import pairs as pairing
 from sgor_ros.evaluation import solver
-from sgor_ros.evaluation.metrics import NEES_BOUND
+from sgor_ros.evaluation.job import turned
+from sgor_ros.evaluation.memory import peak_memory_mb
+from sgor_ros.evaluation.methods import Answer
+from sgor_ros.evaluation.methods import Method
+from sgor_ros.evaluation.methods import sgor
+from sgor_ros.evaluation.methods.sgor import random_labels
+from sgor_ros.evaluation.metrics.pose_error import NEES_BOUND
+from sgor_ros.evaluation.metrics.registration_recall import at_threshold
+from sgor_ros.evaluation.metrics.row import Row
+from sgor_ros.evaluation.protocols import pairs as pairing
+from sgor_ros.evaluation.protocols.ablation import PAPER_ROWS
+from sgor_ros.evaluation.protocols.pairs import Pair
+from sgor_ros.evaluation.report import tables
+from sgor_ros.evaluation.runner import run_pairs
 from sgor_ros.io.datasets import Drive
 from sgor_ros.io.datasets import open_drives
 from sgor_ros.io.trajectories import write_kitti

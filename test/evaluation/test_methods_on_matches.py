@@ -4,7 +4,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from sgor_ros.evaluation.protocols.tables import percent
 
 from sgor_ros import SgorConfig
 from sgor_ros.core.common import se3
@@ -19,9 +18,10 @@ from sgor_ros.evaluation.methods.mac import _selected
 from sgor_ros.evaluation.methods.sc2_pcr import _seeds
 from sgor_ros.evaluation.methods.sc2_pcr import sc2_pcr
 from sgor_ros.evaluation.methods.spectral import spectral_matching
-from sgor_ros.evaluation.metrics import kept_scores
-from sgor_ros.evaluation.metrics import rotation_error_deg
-from sgor_ros.evaluation.metrics import translation_error_m
+from sgor_ros.evaluation.metrics.inliers import kept_scores
+from sgor_ros.evaluation.metrics.pose_error import rotation_error_deg
+from sgor_ros.evaluation.metrics.pose_error import translation_error_m
+from sgor_ros.evaluation.report.protocol_tables import percent
 
 SETS = Path(__file__).resolve().parents[3] / 'shared/data/correspondences'
 T_TRUE = se3.compose(Rotation.from_euler('zyx', [0.7, 0.05, -0.1]).as_matrix(),

@@ -1,14 +1,17 @@
-"""Other methods on raw scans do what they are known for: they find an easy pair, they follow a short drive."""
+"""Other methods on raw scans find an easy pair, odometries follow a short drive."""
 import sys
 
 import numpy as np
 import pytest
-from sgor_ros.evaluation.rivals import kiss_icp
-from sgor_ros.evaluation.rivals import scan_to_scan
 
-from sgor_ros.evaluation import pairs as pairing
-from sgor_ros.evaluation.metrics import rotation_error_deg
-from sgor_ros.evaluation.metrics import translation_error_m
+from sgor_ros.evaluation.job import turned
+from sgor_ros.evaluation.methods import available
+from sgor_ros.evaluation.methods import ON_SCANS
+from sgor_ros.evaluation.methods.odometries import kiss_icp
+from sgor_ros.evaluation.methods.odometries import scan_to_scan
+from sgor_ros.evaluation.metrics.pose_error import rotation_error_deg
+from sgor_ros.evaluation.metrics.pose_error import translation_error_m
+from sgor_ros.evaluation.protocols import pairs as pairing
 
 NAMES = {'kiss-matcher-0.3': 'kiss_matcher', 'kiss-matcher-0.5': 'kiss_matcher',
          'ransac': 'open3d', 'fgr': 'open3d'}
@@ -54,5 +57,6 @@ def test_an_odometry_follows_the_street(make, drive):
 def test_methods_that_are_not_installed_are_left_out_and_named(monkeypatch):
     monkeypatch.setitem(sys.modules, 'kiss_matcher', None)
     said = []
-    assert not [name for name in available(ON_SCANS, said.append) if name.startswith('kiss-matcher')]
+    left = available(ON_SCANS, said.append)
+    assert not [name for name in left if name.startswith('kiss-matcher')]
     assert any('kiss_matcher is not installed' in text for text in said)

@@ -6,11 +6,6 @@ import pytest
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
-from sgor_ros.evaluation.pairs import Pair
-from sgor_ros.evaluation.rivals import Answer
-from sgor_ros.evaluation.run import Method
-from sgor_ros.evaluation.run import Row
-from sgor_ros.evaluation.run import run_pairs
 
 from sgor_ros.commands.benchmark import main
 from sgor_ros.commands.scene_pairs import scene_pairs
@@ -18,8 +13,16 @@ from sgor_ros.core.common import se3
 from sgor_ros.core.verdict.result import Placement
 from sgor_ros.core.verdict.result import Registration
 from sgor_ros.core.verdict.result import Status
-from sgor_ros.evaluation.metrics import nees
-from sgor_ros.evaluation.metrics import NEES_BOUND
+from sgor_ros.evaluation.methods import Answer
+from sgor_ros.evaluation.methods import Method
+from sgor_ros.evaluation.metrics import reliability
+from sgor_ros.evaluation.metrics.pose_error import nees
+from sgor_ros.evaluation.metrics.pose_error import NEES_BOUND
+from sgor_ros.evaluation.metrics.registration_recall import outcomes
+from sgor_ros.evaluation.metrics.row import Row
+from sgor_ros.evaluation.protocols.pairs import Pair
+from sgor_ros.evaluation.report import outcomes as report
+from sgor_ros.evaluation.runner import run_pairs
 from sgor_ros.world.scenes import KINDS
 
 NAN = float('nan')
@@ -110,8 +113,8 @@ def test_the_table_has_a_line_for_each_kind_and_method():
                                  '100 %']
     assert lines['field: n'][:4] == ['1', '0', '1', '0']
     assert lines['**all**: m'][:4] == ['2', '1', '0', '1']
-    assert 'm: wrong 2 of 3 (1 wrong answers and 1 pairs of different places' in report.wrong_claims(
-        rows, ['m'])
+    said = report.wrong_claims(rows, ['m'])
+    assert 'm: wrong 2 of 3 (1 wrong answers and 1 pairs of different places' in said
 
 
 def test_reliability_asks_all_candidates_refused_ones_too():

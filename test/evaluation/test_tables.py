@@ -11,19 +11,17 @@ import time
 import numpy as np
 from PIL import Image
 import pytest
-from sgor_ros.evaluation.pairs import drive_of
-from sgor_ros.evaluation.protocols.run import run
-from sgor_ros.evaluation.protocols.tables import latex
-from sgor_ros.evaluation.protocols.tables import main_rows
-from sgor_ros.evaluation.protocols.tables import whole
-from sgor_ros.evaluation.protocols.task import EASY
 
 from sgor_ros import InputError
 from sgor_ros.core.common import se3
+from sgor_ros.evaluation import front_end
+from sgor_ros.evaluation.methods import Answer
 from sgor_ros.evaluation.methods import Matches
-from sgor_ros.evaluation.metrics import kept_scores
-from sgor_ros.evaluation.protocols import front_end
-from sgor_ros.evaluation.protocols import record
+from sgor_ros.evaluation.methods import Method
+from sgor_ros.evaluation.metrics import row as table
+from sgor_ros.evaluation.metrics.inliers import kept_scores
+from sgor_ros.evaluation.metrics.registration_recall import EASY
+from sgor_ros.evaluation.metrics.row import Row
 from sgor_ros.evaluation.protocols import studies
 from sgor_ros.evaluation.protocols.drives import posed
 from sgor_ros.evaluation.protocols.drives import strided
@@ -36,7 +34,12 @@ from sgor_ros.evaluation.protocols.kitti import kitti_loops
 from sgor_ros.evaluation.protocols.kitti import read_pair_list
 from sgor_ros.evaluation.protocols.kitti import ten_metre_pairs
 from sgor_ros.evaluation.protocols.match_files import given_matches
+from sgor_ros.evaluation.protocols.pairs import drive_of
 from sgor_ros.evaluation.protocols.truth import refined
+from sgor_ros.evaluation.report.protocol_tables import latex
+from sgor_ros.evaluation.report.protocol_tables import main_rows
+from sgor_ros.evaluation.report.protocol_tables import whole
+from sgor_ros.evaluation.runner import run
 from sgor_ros.world import Lidar
 from sgor_ros.world import simulate
 
@@ -187,7 +190,10 @@ def test_another_protocol_does_not_go_into_the_same_folder(tmp_path, drive):
 def test_main_table_by_hand(drive):
     """Of two answers one is right: RR 50, means of RE and TE over that one, of IP over both."""
     def row(pair, te, precision):
-        return record.Record('m', '', task, 'g', 1.0, te, precision, 0.5, 0.4, 100, 0.1, 0.02)
+        return Row(method='m', pair=pair, group='g', rotation_error_deg=1.0,
+                   translation_error_m=te,
+                   within=te < 0.6, precision=precision, recall=0.5, f1=0.4, matches=100,
+                   right_share=0.1, seconds=0.02)
     protocol = strided([drive], [1])
     header, rows = main_rows([row('a', 0.1, 0.8), row('b', 3.0, 0.2)], protocol, EASY)
     assert dict(zip(header, rows[0], strict=True)) == {
