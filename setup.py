@@ -22,6 +22,9 @@ COMMANDS = {
 }
 # the built-in world; the module of open3d without CUDA
 OPEN3D = ['open3d-cpu>=0.18']
+# APE and RPE, the other methods, their matches from depth maps, and a cluster to run on
+EVALUATION = [*OPEN3D, 'evo', 'kiss-icp', 'kiss_matcher', 'small_gicp>=1.0', 'igraph', 'pillow',
+              'distributed', 'matplotlib', 'tqdm']
 
 setup(
     name='sgor_ros',
@@ -72,10 +75,9 @@ setup(
     extras_require={
         # where no ROS 2 Jazzy is installed: the same rclpy with Fast DDS, as wheels
         'ros': ['ros-jazzy-rclpy[fastrtps]', 'ros-jazzy-common-interfaces'],
-        'open3d': OPEN3D,
-        # rivals, their matches from depth maps, and a cluster to run on
-        'benchmark': [*OPEN3D, 'kiss-icp', 'kiss_matcher', 'small_gicp>=1.0', 'igraph', 'pillow',
-                      'distributed'],
+        'open3d': [*OPEN3D, 'evo'],    # evo: the errors that the demo shows
+        'evaluation': EVALUATION,
+        'benchmark': EVALUATION,    # its former name
         # to run what docs/pose_graph.md shows
         'slam': ['gtsam>=4.3', 'g2opy'],
         # --visualize; needs numpy 2, which the messages of an installed Jazzy do not take

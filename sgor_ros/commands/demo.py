@@ -2,6 +2,7 @@
 import argparse
 from collections.abc import Iterator
 from contextlib import closing
+from importlib.util import find_spec
 from pathlib import Path
 import sys
 from typing import Any
@@ -102,6 +103,8 @@ def _run(options: argparse.Namespace) -> int:
         raise InputError(f'no ROS 2 here ({error}): source /opt/ros/jazzy/setup.bash, or pip '
                          "install 'ros-jazzy-rclpy[fastrtps]' ros-jazzy-common-interfaces"
                          ) from error
+    if find_spec('evo') is None:
+        raise InputError('the errors of the track need evo: pip install evo')
     out: Path = options.out
     try:
         out.mkdir(parents=True, exist_ok=True)

@@ -1,4 +1,5 @@
 """Methods on given matches: small cases by hand, an independent version, and the shared sets."""
+import os
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +24,8 @@ from sgor_ros.evaluation.metrics.pose_error import rotation_error_deg
 from sgor_ros.evaluation.metrics.pose_error import translation_error_m
 from sgor_ros.evaluation.report.protocol_tables import percent
 
-SETS = Path(__file__).resolve().parents[3] / 'shared/data/correspondences'
+DATA = Path(os.environ.get('SGOR_DATA', Path(__file__).resolve().parents[3] / 'shared/data'))
+SETS = DATA / 'correspondences'
 T_TRUE = se3.compose(Rotation.from_euler('zyx', [0.7, 0.05, -0.1]).as_matrix(),
                      np.array([3.0, -2.0, 0.5]))
 METHODS = {'SGOR': sgor_solver('SGOR', SgorConfig.paper()), **available(ON_MATCHES, print)}

@@ -2,6 +2,7 @@
 from dataclasses import replace
 import itertools
 import multiprocessing
+import os
 from pathlib import Path
 import signal
 import subprocess
@@ -43,7 +44,7 @@ from sgor_ros.evaluation.runner import run
 from sgor_ros.world import Lidar
 from sgor_ros.world import simulate
 
-DATA = Path(__file__).resolve().parents[3] / 'shared/data'
+DATA = Path(os.environ.get('SGOR_DATA', Path(__file__).resolve().parents[3] / 'shared/data'))
 needs_data = pytest.mark.skipif(not DATA.is_dir(), reason='no shared data')
 
 

@@ -1,6 +1,7 @@
 """`sgor_benchmark sequence`: odometries on drives."""
 from argparse import ArgumentParser
 from argparse import Namespace
+from importlib.util import find_spec
 from pathlib import Path
 
 from ...core.common.settings import InputError
@@ -32,6 +33,8 @@ def add_options(command: ArgumentParser) -> None:
 
 def measure(arguments: Namespace, folder: Path) -> None:
     """Compare odometries on drives, and what the tracker says of itself with the truth."""
+    if find_spec('evo') is None:
+        raise InputError("the errors of tracks need evo: pip install 'sgor_ros[evaluation]'")
     config = inputs.default_config(arguments)
     drives = [drive for drive in inputs.data_drives(arguments) if drive.T_world_sensor is not None
               and drive.heights_known and len(drive.frames) > 1]
