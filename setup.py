@@ -11,7 +11,7 @@ PACKAGE = ElementTree.parse(HERE / 'package.xml').getroot()
 MAINTAINER = PACKAGE.find('maintainer')
 SHARE = 'share/sgor_ros'
 COMMANDS = {
-    'sgor_node': 'sgor_ros.ros.node',
+    'sgor_node': 'sgor_ros.ros.main',
     'sgor_replay': 'sgor_ros.commands.replay',
     'sgor_register': 'sgor_ros.commands.register',
     'sgor_kitti_to_bag': 'sgor_ros.commands.kitti_to_bag',

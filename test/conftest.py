@@ -68,7 +68,7 @@ def errors(T, truth):
 @pytest.fixture(scope='module')
 def domain():
     """Yield a ROS domain that no other test on this machine uses."""
-    from sgor_ros.ros.player import Domain  # only where there is ROS
+    from sgor_ros.ros.playback.domain import Domain  # only where there is ROS
     domain = Domain()
     yield domain
     domain.close()

@@ -6,9 +6,9 @@ from scipy.spatial.transform import Rotation
 
 from sgor_ros.io.messages import point_cloud2
 from sgor_ros.io.messages import stamp_ns_of
-from sgor_ros.ros.player import Player
-from sgor_ros.ros.player import SETTLING_S
-from sgor_ros.ros.player import values_of
+from sgor_ros.ros.playback.player import Player
+from sgor_ros.ros.playback.player import SETTLING_S
+from sgor_ros.ros.playback.player import values_of
 from sgor_ros.ros.types import ros_type
 from sgor_ros.world import Lidar
 from sgor_ros.world import simulate
@@ -26,7 +26,11 @@ class Partner(Player):
 
     def outcome(self, cloud, timeout_s=20.0):
         """Publish a cloud, wait for what the node says about it: (level, message, values)."""
-        before, stamp_ns = len(self.diagnostics), stamp_ns_of(cloud.header)
+        return self.outcome_of(stamp_ns_of(cloud.header), cloud, timeout_s)
+
+    def outcome_of(self, stamp_ns, cloud, timeout_s=20.0):
+        """Do the same with a cloud that may be serialised."""
+        before = len(self.diagnostics)
 
         def told():
             return [message for message in self.diagnostics[before:]

@@ -19,9 +19,9 @@ from .benchmarks import wrong
 from .benchmarks.inputs import default_config
 from .benchmarks.inputs import say
 from .benchmarks.numbers import positive
-from .frame import OK
-from .frame import Parser
-from .frame import run
+from .command_line import OK
+from .command_line import Parser
+from .command_line import run
 
 
 class Benchmark(Protocol):

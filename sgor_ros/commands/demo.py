@@ -24,10 +24,10 @@ from ..io.bags import BagReader
 from ..io.bags import CLOUD_TYPE
 from ..io.messages import matrix_of
 from ..io.messages import stamp_ns_of
-from .frame import FAILED
-from .frame import OK
-from .frame import Parser
-from .frame import run
+from .command_line import FAILED
+from .command_line import OK
+from .command_line import Parser
+from .command_line import run
 from .recorded_drive import Recorded
 from .recorded_drive import recorded_drive
 from .world_bag import STREET
@@ -35,7 +35,7 @@ from .world_bag import WorldMap
 from .world_bag import write_world_bag
 
 if TYPE_CHECKING:
-    from ..ros.player import Player
+    from ..ros.playback.player import Player
 
 Array = NDArray[np.float64]
 
@@ -96,9 +96,9 @@ def _parse(arguments: list[str] | None) -> argparse.Namespace:
 def _run(options: argparse.Namespace) -> int:
     try:
         # late, so that --help and the message below work without ROS
-        from ..ros.player import Domain
-        from ..ros.player import NodeProcess
-        from ..ros.player import Player
+        from ..ros.playback.domain import Domain
+        from ..ros.playback.node_process import NodeProcess
+        from ..ros.playback.player import Player
     except ImportError as error:
         raise InputError(f'no ROS 2 here ({error}): source /opt/ros/jazzy/setup.bash, or pip '
                          "install 'ros-jazzy-rclpy[fastrtps]' ros-jazzy-common-interfaces"
@@ -179,7 +179,7 @@ def _restamped(clouds: list[Any], recorded_ns: list[int], scans: list[tuple[int,
 def _compare(player: 'Player', truth: dict[int, Array], world: WorldMap, memory_mb: list[float],
              options: argparse.Namespace) -> int:
     """Print the table, write the pictures and judge."""
-    from ..ros.player import values_of
+    from ..ros.playback.player import values_of
     out: Path = options.out
     poses = {stamp_ns_of(message.header): matrix_of(message.pose.pose)
              for message in player.odometry}

@@ -12,9 +12,9 @@ from ..io.datasets import semantickitti
 from ..io.messages import odometry_of
 from ..io.messages import point_cloud2
 from ..io.trajectories import read_calibration
-from .frame import OK
-from .frame import Parser
-from .frame import run
+from .command_line import OK
+from .command_line import Parser
+from .command_line import run
 
 CLOUD_TOPIC = '/points'
 TRUTH_TOPIC = '/ground_truth'

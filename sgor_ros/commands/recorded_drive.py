@@ -55,7 +55,7 @@ def recorded_drive(folder: Path, most: int) -> Recorded:
     drive = open_drive(folder)
     if drive.T_world_sensor is None:
         raise InputError(f'--data {folder}: no poses.txt, and so no truth to compare with')
-    if len(drive.frames) < 2:
+    if len(drive.scans) < 2:
         raise InputError(f'--data {folder}: at least 2 scans')
     types = get_typestore(Stores.ROS2_JAZZY).types.__getitem__
     truth: dict[int, NDArray[np.float64]] = {}
@@ -73,7 +73,7 @@ def recorded_drive(folder: Path, most: int) -> Recorded:
 
 def _scans(drive: Drive, most: int) -> Iterator[tuple[int, Any, Any, NDArray[np.float64]]]:
     assert drive.T_world_sensor is not None
-    pairs = zip(drive.frames[:most], drive.T_world_sensor, strict=False)
-    for i, (frame, pose) in enumerate(pairs):
-        scan = frame.read()
+    pairs = zip(drive.scans[:most], drive.T_world_sensor, strict=False)
+    for i, (recorded, pose) in enumerate(pairs):
+        scan = recorded.read()
         yield FIRST_STAMP_NS + i * PERIOD_NS, scan.points, scan.labels, pose

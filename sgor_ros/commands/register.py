@@ -25,10 +25,10 @@ from ..io.plots import plot_registration
 from ..io.scans import read_scan
 from ..io.writing import check_file
 from ..io.writing import new_file
-from .frame import FAILED
-from .frame import OK
-from .frame import Parser
-from .frame import run
+from .command_line import FAILED
+from .command_line import OK
+from .command_line import Parser
+from .command_line import run
 from .options import add_params_file
 from .options import add_preset
 from .options import add_settings

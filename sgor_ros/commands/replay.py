@@ -1,15 +1,11 @@
-"""`sgor_replay`: the tracker over a bag, without ROS; the same poses as the node's."""
+"""`sgor_replay`: the pipeline of the node over a bag or a folder, without ROS."""
 from argparse import Namespace
 from contextlib import ExitStack
 from contextlib import nullcontext
-from dataclasses import asdict
-import json
-import math
 from pathlib import Path
 import sys
-from typing import Any
+from typing import TYPE_CHECKING
 
-import numpy as np
 from tqdm import tqdm
 
 from .. import visualize
@@ -17,24 +13,27 @@ from ..core.common.settings import InputError
 from ..core.config import SgorConfig
 from ..core.scan.labels import label_convention
 from ..core.warmup import warm_up
-from ..evaluation.report.track_plots import plot_track
 from ..io.bags import BagReader
 from ..io.bags import BagWriter
 from ..io.bags import is_bag
 from ..io.datasets import open_drive
-from ..io.datasets.clouds import DriveReader
-from ..io.environment import describe_environment
+from ..io.datasets.bags import BagSequence
+from ..io.label_field import AUTO
+from ..io.label_field import NONE
+from ..io.sequence import ScanSequence
 from ..io.stream_config import StreamConfig
-from ..io.trajectories import write_kitti
-from ..io.trajectories import write_tum
 from ..io.writing import free_folder
 from ..io.writing import new_folder
+from ..pipeline import extrinsic
+from ..pipeline.outcome import Row
+from ..pipeline.pipeline import Pipeline
+from ..pipeline.sinks import BagSink
 from ..tracker import Tracker
 from ..tracker import TrackerConfig
-from .frame import FAILED
-from .frame import OK
-from .frame import Parser
-from .frame import run
+from .command_line import FAILED
+from .command_line import OK
+from .command_line import Parser
+from .command_line import run
 from .options import add_params_file
 from .options import add_preset
 from .options import add_settings
@@ -42,9 +41,13 @@ from .options import add_visualize
 from .options import configured
 from .options import PRESETS
 from .options import read_parameters
-from .replay_steps import Row
-from .replay_steps import Steps
-from .replay_steps import Warnings
+from .replay_results import print_results
+from .replay_results import summary_of
+from .replay_results import Warnings
+from .replay_results import write_results
+
+if TYPE_CHECKING:
+    from ..visualize.track import TrackView
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -53,57 +56,82 @@ def main(argv: list[str] | None = None) -> int:
 
 
 def replay(arguments: Namespace) -> int:
-    """Track the clouds of a bag and write the results; 1 where no scan could be registered."""
+    """Track the scans of a bag or folder and write the results; 1 where none was registered."""
     parameters = read_parameters(arguments, SgorConfig, TrackerConfig, StreamConfig)
     stream = configured(StreamConfig(), arguments, parameters)
-    drive = (None if is_bag(arguments.bag_path)
-             else open_drive(arguments.bag_path, arguments.sequence))
-    start = PRESETS[arguments.preset]()
-    if drive is not None:
-        start = start.replace(label_convention=drive.label_convention)
-    tracker = Tracker(configured(start, arguments, parameters),
-                      configured(TrackerConfig(), arguments, parameters))
+    mount = extrinsic.configured(stream)
+    if stream.base_frame and mount is None:
+        raise InputError(f'base_frame = {stream.base_frame!r}: the replay has no tf2 to look it '
+                         'up, so it needs T_base_sensor')
     if arguments.visualize is not None:
         visualize.check(arguments.visualize)
-    label_convention(tracker.config.label_convention)
-    warnings = Warnings()
-    rows: list[Row] = []
-    broken: InputError | None = None
     with ExitStack() as stack:
-        bag: BagReader | DriveReader = (
-            stack.enter_context(BagReader(arguments.bag_path)) if drive is None
-            else stack.enter_context(DriveReader(drive)))
-        topic = arguments.topic or bag.find_topic(stream.label_field)
-        clouds, expected = bag.clouds(topic), bag.cloud_topics()[topic]
+        sequence = _sequence(arguments, stream, stack)
+        start = PRESETS[arguments.preset]()
+        if sequence.label_convention is not None:
+            start = start.replace(label_convention=sequence.label_convention)
+        tracker = Tracker(configured(start, arguments, parameters),
+                          configured(TrackerConfig(), arguments, parameters))
+        label_convention(tracker.config.label_convention)
         output: Path = arguments.output or free_folder(_usual_output(arguments))
         place = stack.enter_context(new_folder(output))
         place.mkdir()
+        warnings = Warnings()
         with BagWriter(place / 'bag') if arguments.bag else nullcontext() as writer:
             warm_up(tracker.config)
-            look = (None if arguments.visualize is None else stack.enter_context(
+            view = (None if arguments.visualize is None else stack.enter_context(
                 visualize.track_view(arguments.visualize, tracker.config)))
-            steps = Steps(tracker, stream, writer, warnings, look)
-            try:
-                for cloud in tqdm(clouds, total=expected, unit='scan', disable=None):
-                    rows.append(steps.take(cloud))
-            except InputError as error:
-                broken = error    # what came before is worth keeping
-        if broken and not rows:
-            raise broken
-        if len(rows) < expected:
-            warnings.add(f'{topic}: the bag tells of {expected} clouds, only {len(rows)} came')
-        if all(row.T_odom_sensor is None for row in rows):
-            raise InputError(f'{topic}: none of {len(rows)} clouds could be used: '
-                             f'{rows[0].reason}')
-        summary = _summary(rows, warnings.texts, arguments.bag_path, topic, tracker, stream)
-        _write(place, rows, summary, f'{arguments.bag_path.name} {topic}')
-    _print(summary, output)
+            pipeline = Pipeline(tracker, stream, BagSink(writer) if writer else None, mount)
+            rows, broken = _run(sequence, pipeline, view, warnings)
+        summary = summary_of(rows, warnings.texts, arguments.bag_path, sequence.name, tracker,
+                             stream)
+        write_results(place, rows, summary, f'{arguments.bag_path.name} {sequence.name}')
+    print_results(summary, output)
     if broken:
         raise InputError(f'after {len(rows)} scans: {broken}')
-    if len(rows) > 1 and all(row.T_odom_sensor is None or row.restarted for row in rows):
+    if len(rows) > 1 and all(row.T_odom_child is None or row.restarted for row in rows):
         print('error: no scan could be registered to another', file=sys.stderr)
         return FAILED
     return OK
+
+
+def _sequence(arguments: Namespace, stream: StreamConfig, stack: ExitStack) -> ScanSequence:
+    """Open the bag or the folder."""
+    if is_bag(arguments.bag_path):
+        bag = stack.enter_context(BagReader(arguments.bag_path))
+        topic = arguments.topic or bag.find_topic(stream.label_field)
+        return BagSequence(bag, topic, stream.label_field)
+    drive = open_drive(arguments.bag_path, arguments.sequence)
+    if stream.label_field not in (AUTO, NONE):
+        raise InputError(f'label_field = {stream.label_field!r}: only the clouds of a bag have '
+                         f'fields; for a folder it is {AUTO} or {NONE}')
+    return drive if stream.label_field == AUTO else drive.without_labels()
+
+
+def _run(sequence: ScanSequence, pipeline: Pipeline, view: 'TrackView | None',
+         warnings: Warnings) -> tuple[list[Row], InputError | None]:
+    """Return a row for each scan, and what a bag broke off with, if there were scans before."""
+    rows: list[Row] = []
+    broken: InputError | None = None
+    try:
+        for scan in tqdm(sequence, total=sequence.expected, unit='scan', disable=None):
+            warnings.note(scan.note)
+            outcome = pipeline.process(scan)
+            if view and outcome.scan is not None and outcome.tracked is not None:
+                view.show(outcome.scan, outcome.tracked)
+            warnings.add_those_of(outcome)
+            rows.append(outcome.row())
+    except InputError as error:
+        broken = error    # what came before is worth keeping
+    if broken and not rows:
+        raise broken
+    if sequence.expected is not None and len(rows) < sequence.expected:
+        warnings.add(f'{sequence.name}: the bag tells of {sequence.expected} clouds, only '
+                     f'{len(rows)} came')
+    if all(row.T_odom_child is None for row in rows):
+        raise InputError(f'{sequence.name}: none of {len(rows)} clouds could be used: '
+                         f'{rows[0].reason}')
+    return rows, broken
 
 
 def _parser() -> Parser:
@@ -139,48 +167,6 @@ def _usual_output(arguments: Namespace) -> Path:
     bag: Path = arguments.bag_path
     name = arguments.sequence or (bag.resolve().name if bag.is_dir() else bag.stem)
     return Path('out') / f'{name.replace("/", "_")}_replay'
-
-
-def _summary(rows: list[Row], warnings: list[str], bag: Path, topic: str, tracker: Tracker,
-             stream: StreamConfig) -> dict[str, Any]:
-    stages = dict.fromkeys(stage for row in rows for stage in row.timings)
-    return {
-        'bag': str(bag), 'topic': topic, 'scans': len(rows),
-        'successes': sum(row.T_odom_sensor is not None for row in rows),
-        'failures': [{'scan': i, 'stamp_ns': row.stamp_ns, 'reason': row.reason}
-                     for i, row in enumerate(rows) if row.T_odom_sensor is None],
-        # the first scan of all is one of them
-        'restarts': [i for i, row in enumerate(rows) if row.restarted],
-        'timings_ms': {
-            'total': _statistics([row.seconds for row in rows]),
-            **{stage: _statistics([row.timings[stage] for row in rows if stage in row.timings])
-               for stage in stages}},
-        'warnings': warnings,
-        'parameters': {**asdict(stream), **asdict(tracker.tracker_config),
-                       **asdict(tracker.config)},
-        'environment': describe_environment()}
-
-
-def _statistics(seconds: list[float]) -> dict[str, float]:
-    taken = np.array([s for s in seconds if math.isfinite(s)]) * 1e3
-    return {'median': round(float(np.median(taken)), 3),
-            'p95': round(float(np.percentile(taken, 95)), 3)}
-
-
-def _write(output: Path, rows: list[Row], summary: dict[str, Any], title: str) -> None:
-    stamps_ns, poses = [row.stamp_ns for row in rows], [row.T_odom_sensor for row in rows]
-    write_tum(output / 'trajectory.tum', stamps_ns, poses)
-    write_kitti(output / 'trajectory_kitti.txt', poses)
-    (output / 'summary.json').write_text(json.dumps(summary, indent=2) + '\n')
-    plot_track(output / 'trajectory.png', title, [stamp * 1e-9 for stamp in stamps_ns], poses,
-               [row.seconds for row in rows], [row.confidence for row in rows])
-
-
-def _print(summary: dict[str, Any], output: Path) -> None:
-    total = summary['timings_ms']['total']
-    print(f'{summary["successes"]} of {summary["scans"]} scans have a pose; time per scan: median '
-          f'{total["median"]:.0f} ms, p95 {total["p95"]:.0f} ms\n'
-          f'wrote {output}: {", ".join(sorted(path.name for path in output.iterdir()))}')
 
 
 if __name__ == '__main__':

@@ -37,7 +37,7 @@ from ..evaluation.runner import run
 from ..io.datasets import Drive
 from ..io.datasets import Frame
 from ..io.datasets import open_drives
-from . import frame
+from . import command_line
 from .benchmarks import inputs
 
 SPEED_M_S = 8.0
@@ -46,11 +46,11 @@ ABLATION = 'ablation'
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command and return its exit code."""
-    return frame.run(_tables, _parser().parse_args(arguments))
+    return command_line.run(_tables, _parser().parse_args(arguments))
 
 
-def _parser() -> frame.Parser:
-    parser = frame.Parser(
+def _parser() -> command_line.Parser:
+    parser = command_line.Parser(
         'sgor_tables', 'PROTOCOL [options]',
         'Run a protocol of the literature with every method on the same matches, and print its '
         'table beside the published rows. Stopped, it goes on where it was when it is started '
@@ -117,7 +117,7 @@ def _tables(arguments: Namespace) -> int:
                   variants=studies.variants(study, arguments.values, arguments.seed),
                   processes=arguments.processes, dask=arguments.dask)
     print(page.write(output, rows, protocol, methods, study, features))
-    return frame.OK
+    return command_line.OK
 
 
 def _methods(arguments: Namespace, protocol: Protocol) -> list[Method]:

@@ -101,6 +101,19 @@ class BagReader:
         """Return the PointCloud2 topics that have messages, and how many."""
         return dict(self._topics)
 
+    def count(self, topic: str) -> int:
+        """Return how many clouds a topic has.
+
+        Raises
+        ------
+        InputError
+            No such topic of clouds.
+        """
+        if topic not in self._topics:
+            raise InputError(f'topic {topic}: no clouds in {self.path}; there are '
+                             f'{", ".join(self._topics) or "none"}')
+        return self._topics[topic]
+
     def find_topic(self, label_field: str) -> str:
         """Return the one topic of labelled clouds, or the one topic of clouds.
 
@@ -140,9 +153,7 @@ class BagReader:
         InputError
             No such topic of clouds, or a bag that breaks off.
         """
-        if topic not in self.cloud_topics():
-            raise InputError(f'topic {topic}: no clouds in {self.path}; there are '
-                             f'{", ".join(self.cloud_topics()) or "none"}')
+        self.count(topic)
         return self._iterate([c for c in self._reader.connections
                               if c.topic == topic and c.msgtype == CLOUD_TYPE], at_ns)
 

@@ -96,6 +96,13 @@ def transform_stamped(types: Types, T: NDArray[np.float64], stamp_ns: int, frame
             translation=_point(vector, T[:3, 3]), rotation=pose(types, T).orientation))
 
 
+def tf_message(types: Types, T: NDArray[np.float64], stamp_ns: int, frame: str, child_frame: str
+               ) -> Any:
+    """Return a tf2_msgs/msg/TFMessage of a (4, 4) pose of the child in the frame."""
+    return types('tf2_msgs/msg/TFMessage')(
+        transforms=[transform_stamped(types, T, stamp_ns, frame, child_frame)])
+
+
 def pose_stamped(types: Types, tracked: TrackedScan, odom_frame: str) -> Any:
     """Return a geometry_msgs/msg/PoseStamped of a scan that has a pose."""
     return types('geometry_msgs/msg/PoseStamped')(

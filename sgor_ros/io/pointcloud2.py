@@ -53,7 +53,7 @@ def decode(message: Any, label_field: str) -> SemanticScan:
 
 
 def _records(message: Any, names: tuple[str, ...]) -> NDArray[Any]:
-    """ScanIndex the bytes of the cloud as (N,) records of the fields `names`; organised or not."""
+    """View the bytes of the cloud as (N,) records of the fields `names`; organised or not."""
     width, height, point_step = message.width, message.height, message.point_step
     if width * height == 0:
         raise InputError(f'width x height = {width} x {height}: the cloud is empty')

@@ -1,103 +1,162 @@
-"""The process of `sgor_node`: how it starts, and how it ends.
+"""`SgorNode`: clouds of a topic to the pipeline on a thread of its own, and its health told."""
+import threading
+import time
+from typing import Any
 
-Exit codes: 0 after SIGINT or SIGTERM, at any moment; 2 where it cannot start as it was told to;
-1 with a traceback where the program is wrong.
-"""
-from importlib import metadata
-import os
-import sys
-from typing import TYPE_CHECKING
+from rclpy.node import Node
+from sensor_msgs.msg import PointCloud2
 
-from . import signals
+from ..core.warmup import warm_up
+from ..io import messages
+from ..io.sequence import ScanSequence
+from ..io.sequence import StampedScan
+from ..pipeline import extrinsic
+from ..pipeline.pipeline import Pipeline
+from ..tracker import State
+from ..tracker import Tracker
+from .diagnostics import status
+from .diagnostics.publisher import DiagnosticsPublisher
+from .diagnostics.throttled_log import forwarded
+from .diagnostics.throttled_log import ThrottledLog
+from .input.stamp_gaps import StampGaps
+from .input.stream import CloudStream
+from .input.subscription import CloudSubscription
+from .input.subscription import override_names
+from .output.publishers import refuse_unknown_overrides
+from .output.sink import TopicSink
+from .output.tf2_extrinsic import tf2_extrinsic
+from .parameters import NodeConfig
+from .parameters import NodeParameters
+from .services import Services
 
-if TYPE_CHECKING:
-    from .sgor_node import SgorNode
-
-# how long the executor waits before it looks for a signal
-PATIENCE_S = 0.1
-HELP = """\
-usage: sgor_node [--ros-args [-r points:=TOPIC] [-p NAME:=VALUE ...] [--params-file YAML]]
-
-Odometry and relative poses from labelled clouds (sensor_msgs/PointCloud2 on `points`), as a ROS 2
-node. Parameters, with unit, bounds and meaning: config/sgor_node.yaml, which is a parameter file.
-
-examples:
-  ros2 run sgor_ros sgor_node --ros-args -r points:=/lidar/labelled
-  ros2 run sgor_ros sgor_node --ros-args -p mode:=consecutive -p voxel_size:=0.3
-  ros2 param describe /sgor_node voxel_size
-
-exit codes:
-  0    ended by SIGINT or SIGTERM
-  1    a fault of the program (with a traceback)
-  2    cannot start as it was told to"""
-
-
-def main(args: list[str] | None = None) -> int:
-    """Run the node until a signal comes; return the exit code of the process."""
-    signals.end_at_once()
-    if asked := _asked(sys.argv[1:] if args is None else args):
-        print(asked)
-        return 0
-    # late: this takes a second, in which signals must do already
-    try:
-        import rclpy
-        from rclpy.signals import SignalHandlerOptions
-    except ImportError as error:
-        return _refuse(f'no ROS 2 here ({error}): source /opt/ros/jazzy/setup.bash')
-
-    from ..core.common.settings import InputError
-    from .sgor_node import SgorNode
-
-    flag = signals.SignalFlag()
-    try:
-        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
-    except RuntimeError as error:
-        # such as a parameter file that is missing or is no YAML
-        return _refuse(error)
-    try:
-        return _run(SgorNode(), flag)
-    except InputError as error:
-        return _refuse(error)
-    finally:
-        signals.ignore()
-        rclpy.try_shutdown()
+# a scan at work is finished before the end, unless it takes this long
+GRACE_S = 3.0
 
 
-def _run(node: 'SgorNode', flag: signals.SignalFlag) -> int:
-    from rclpy.executors import SingleThreadedExecutor
+class SgorNode(Node):
+    """One thread receives (the executor's), one works; between them a slot for the latest scan.
 
-    executor = SingleThreadedExecutor()
-    executor.add_node(node)
-    node.start()
-    try:
-        while not flag.raised and not node.crash:
-            executor.spin_once(PATIENCE_S)
-    finally:
-        ended = node.stop()
-        print(node.counts(), flush=True)
-        if not ended:
-            # it compiles, or its scan takes minutes: threads can't be stopped, processes can
-            sys.stderr.flush()
-            os._exit(0)
-        executor.shutdown()
-        node.destroy_node()
-    if node.crash:
-        raise node.crash
-    return 0
+    Parameters
+    ----------
+    name : str
+    options
+        Of `rclpy.node.Node`, such as ``namespace`` and ``parameter_overrides``, for several nodes
+        in one process.
+    """
 
+    def __init__(self, name: str = 'sgor_node', **options: Any) -> None:
+        super().__init__(name, **options)
+        self._settings = NodeParameters(self)
+        self._config = self._settings.node_config
+        self._pipeline = self._pipeline_of(self._config)
+        self._requests = Services(self, self._config.odom_frame)
+        self._stream = CloudStream(self.resolve_topic_name('points'), self._config.label_field)
+        self._gaps = StampGaps()
+        self._processed = self._failed = self._late = self._paused = 0
+        self._log = ThrottledLog(self.get_logger())
+        self._diagnostics = DiagnosticsPublisher(self, self._log, self.counts, self._idle)
+        self._worker = threading.Thread(target=self._work, name='sgor worker')
+        self._compiled = False
+        self._heard_at = self._began_at = 0.0
+        self.crash: Exception | None = None
+        refuse_unknown_overrides(self, override_names(self))
 
-def _asked(args: list[str]) -> str:
-    """Return what was asked for in place of a node: needs no ROS."""
-    own = args[:args.index('--ros-args')] if '--ros-args' in args else args
-    if '--version' in own:
-        return f'sgor_ros {metadata.version("sgor_ros")}'
-    return HELP if {'-h', '--help'} & set(own) else ''
+    def _pipeline_of(self, config: NodeConfig) -> Pipeline:
+        sink = TopicSink(self, config.publish_tf)
+        mount = extrinsic.configured(config)
+        if mount is None and config.base_frame:
+            mount = tf2_extrinsic(self, config.base_frame)
+        return Pipeline(Tracker(*self._settings.live), config, sink, mount,
+                        inverted_tf=config.invert_tf)
 
+    def start(self) -> None:
+        """Begin to work; clouds are subscribed to once everything is compiled."""
+        self._worker.start()
 
-def _refuse(error: Exception | str) -> int:
-    print(f'error: {error}', file=sys.stderr)
-    return 2
+    def stop(self) -> bool:
+        """Let the worker finish its scan, wait a while; return whether it has ended.
 
+        One that compiles is not waited for: that may take minutes.
+        """
+        self._stream.close()
+        if self._worker.is_alive():
+            self._worker.join(GRACE_S if self._compiled else 0.0)
+        return not self._worker.is_alive()
 
-if __name__ == '__main__':
-    sys.exit(main())
+    def counts(self) -> status.Counts:
+        """Return what became of the scans so far."""
+        return status.Counts(self._stream.received, self._processed, self._stream.replaced,
+                             self._failed, self._late, self._gaps.missed, self._paused)
+
+    def _idle(self) -> tuple[bytes, str]:
+        """Return level and words for what is going on while there is no scan to report."""
+        now = time.monotonic()
+        if not self._compiled:
+            return status.WARN, 'compiling'
+        if self._requests.paused:
+            return status.WARN, 'paused: clouds are left out'
+        if self._began_at:
+            return status.WARN, f'a scan has been worked on for {now - self._began_at:.1f} s'
+        if not self._heard_at:
+            return status.WARN, 'no clouds yet'
+        return status.STALE, f'no clouds for {now - self._heard_at:.1f} s'
+
+    def _receive(self, cloud: PointCloud2) -> None:
+        self._heard_at = time.monotonic()
+        self._gaps.take(messages.stamp_ns_of(cloud.header))
+        if self._requests.paused:
+            self._paused += 1
+        else:
+            self._stream.put(cloud)
+
+    def _work(self) -> None:
+        """Run on the worker's thread until the stream is closed."""
+        try:
+            self._warm_up()
+            self._compiled = True
+            self._subscription = CloudSubscription(self, self._config.reliability, self._receive)
+            self._process_all(self._stream)
+        except Exception as error:
+            self.crash = error
+
+    def _warm_up(self) -> None:
+        log = self.get_logger()
+        begin = time.monotonic()
+        with forwarded(log):
+            warm_up(self._settings.live[0])
+        log.info(f'ready after {time.monotonic() - begin:.1f} s, waiting for clouds on '
+                 f'{self._stream.name}')
+
+    def _process_all(self, scans: ScanSequence) -> None:
+        for scan in scans:
+            self._began_at = time.monotonic()
+            self._process(scan)
+            self._began_at = 0.0
+
+    def _process(self, scan: StampedScan) -> None:
+        """Apply what was asked for, run the pipeline, count and report what became of the scan."""
+        self._log.info_once(scan.note)
+        self._apply_requests()
+        outcome = self._pipeline.process(scan)
+        if not outcome.frame:
+            self._log.warn_once('the clouds have no frame_id: set the parameter sensor_frame')
+        tracked = outcome.tracked
+        late = tracked is not None and tracked.state is State.LATE
+        done = tracked is not None and tracked.success
+        self._processed += done
+        self._late += late
+        self._failed += not done and not late
+        now = time.monotonic()
+        self._diagnostics.report(outcome.stamp_ns, outcome.frame, *status.level_of(outcome), {
+            **status.details(tracked), 'seconds': f'{now - self._began_at:.4f}',
+            'latency': f'{now - scan.arrived_ns * 1e-9:.4f}'})
+
+    def _apply_requests(self) -> None:
+        """Take over the parameters and what the services were asked for since the last scan."""
+        tracker = self._pipeline.tracker
+        tracker.config, tracker.tracker_config = self._settings.live
+        reset, start = self._requests.take()
+        if start is not None:
+            self._pipeline.begin_at(*start)
+        if reset:
+            tracker.reset()

@@ -12,13 +12,13 @@ import numpy as np
 import pytest
 
 from sgor_ros import warm_up
-from sgor_ros.commands.frame import AGAIN_S
-from sgor_ros.commands.frame import CODES
-from sgor_ros.commands.frame import run
+from sgor_ros.commands.command_line import AGAIN_S
+from sgor_ros.commands.command_line import CODES
+from sgor_ros.commands.command_line import run
 
 MODULES = {'sgor_register': 'commands.register', 'sgor_replay': 'commands.replay',
            'sgor_kitti_to_bag': 'commands.kitti_to_bag', 'sgor_benchmark': 'commands.benchmark',
-           'sgor_demo': 'commands.demo', 'sgor_tables': 'commands.tables', 'sgor_node': 'ros.node'}
+           'sgor_demo': 'commands.demo', 'sgor_tables': 'commands.tables', 'sgor_node': 'ros.main'}
 COMMANDS = [(name,) for name in MODULES if name != 'sgor_node'] + [
     ('sgor_benchmark', kind) for kind in ('pairs', 'wrong', 'ablation', 'sequence', 'solver')]
 WITHOUT_ROS = 'import sys; sys.modules["rclpy"] = None; from sgor_ros.{} import main; ' \
@@ -80,7 +80,7 @@ def test_a_slip_is_answered_in_two_lines(command, capsys):
     assert '--help' in second
 
 
-@pytest.mark.parametrize('module', ['ros.node', 'commands.demo'])
+@pytest.mark.parametrize('module', ['ros.main', 'commands.demo'])
 def test_without_ros(module):
     for option in ('--help', '--version'):
         said = ran(sys.executable, '-c', WITHOUT_ROS.format(module), option)

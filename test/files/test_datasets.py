@@ -21,6 +21,8 @@ from sgor_ros import SgorConfig
 from sgor_ros.commands.kitti_to_bag import main as kitti_to_bag
 from sgor_ros.commands.replay import main as replay
 from sgor_ros.core.scan.labels import label_convention
+from sgor_ros.io.bags import BagReader
+from sgor_ros.io.datasets.bags import BagSequence
 from sgor_ros.io.datasets.mulran import T_BASE_SENSOR
 from sgor_ros.io.trajectories import read_kitti
 from sgor_ros.io.trajectories import write_kitti
@@ -197,6 +199,9 @@ def test_a_bag_and_what_it_was_made_of(street, tmp_path):
         np.testing.assert_array_equal(bag.read(i).labels, drive.read(i).labels)
     np.testing.assert_allclose(relative(*bag.T_world_sensor[[0, 3]]),
                                relative(*drive.T_world_sensor[[0, 3]]), atol=1e-6)
+    with BagReader(tmp_path / 'bag') as reader:
+        sequence = BagSequence(reader, '/points')
+        np.testing.assert_array_equal(sequence.T_world_sensor, bag.T_world_sensor)
 
 
 def test_clouds_of_a_bag_at_the_same_time_are_told_apart(street, tmp_path):

@@ -26,8 +26,8 @@ from sgor_ros import TrackerConfig
 from sgor_ros.io.messages import matrix_of
 from sgor_ros.ros.parameters import NodeConfig
 from sgor_ros.ros.parameters import yaml_files
-from sgor_ros.ros.player import NodeProcess
-from sgor_ros.ros.player import SETTLING_S
+from sgor_ros.ros.playback.node_process import NodeProcess
+from sgor_ros.ros.playback.player import SETTLING_S
 from sgor_ros.ros.types import ros_type
 from sgor_ros.world import Lidar
 from sgor_ros.world import simulate
@@ -514,7 +514,7 @@ def test_a_reliable_only_node_says_what_it_cannot_hear(domain, tmp_path):
                                           reason='tf2_msgs is installed')),
 ])
 def test_what_cannot_work_ends_the_start_with_a_message(domain, argument, words):
-    ran = subprocess.run([sys.executable, '-m', 'sgor_ros.ros.node', '--ros-args', '-p', argument],
+    ran = subprocess.run([sys.executable, '-m', 'sgor_ros.ros.main', '--ros-args', '-p', argument],
                          env=domain.environment(), cwd=ROOT, capture_output=True, text=True,
                          timeout=60)
     assert ran.returncode == 2

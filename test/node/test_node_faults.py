@@ -12,7 +12,7 @@ from std_srvs.srv import Trigger
 
 from sgor_ros.io.messages import matrix_of
 from sgor_ros.io.messages import stamp_ns_of
-from sgor_ros.ros.player import NodeProcess
+from sgor_ros.ros.playback.node_process import NodeProcess
 from sgor_ros.world import Lidar
 from sgor_ros.world import simulate
 
@@ -32,7 +32,7 @@ def elsewhere():
 
 
 @pytest.fixture(scope='module')
-def parallel_for(domain, tmp_path_factory):
+def shared(domain, tmp_path_factory):
     log = tmp_path_factory.mktemp('node') / 'log'
     with NodeProcess(domain, log) as node, ros.Partner(domain) as partner:
         partner.wait_for_node(node.alive)

@@ -19,7 +19,7 @@ from sgor_ros.io.frames import parse_transform
 from sgor_ros.io.messages import matrix_of
 from sgor_ros.io.messages import matrix_of_transform
 from sgor_ros.io.messages import transform_stamped
-from sgor_ros.ros.player import NodeProcess
+from sgor_ros.ros.playback.node_process import NodeProcess
 from sgor_ros.ros.types import ros_type
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -153,9 +153,31 @@ def test_without_a_transform_to_the_base_nothing_is_published(domain, scans, tmp
     assert node.log.read_text().count('no transform from lidar to base_link') == 1
 
 
+def test_a_stamp_that_tf2_refuses_fails_one_scan(domain, scans, tmp_path, tf2_msgs, monkeypatch):
+    """Before 1970, say, where a driver subtracts its offset from a clock that was not set."""
+    if not INSTALLED['tf2_ros']:
+        monkeypatch.setenv('PYTHONPATH', os.pathsep.join(
+            (str(HERE / 'tf2_stand_in'), os.environ.get('PYTHONPATH', ''))))
+    latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    with start(domain, tmp_path, 'base_frame:=base_link') as node, \
+            ros.Partner(domain) as partner:
+        partner.node.create_publisher(tf2_msgs, '/tf_static', latched).publish(tf2_msgs(
+            transforms=[transform_stamped(ros_type, T_BASE_SENSOR, 0, 'base_link', 'lidar')]))
+        partner.wait_for_node(node.alive)
+        partner.spin_for(1.0)
+        early = (-5_000_000_000, *scans[0][1:])
+        (level, message, _), = play(partner, node, [early])
+        assert level == WARN
+        assert 'no transform from lidar to base_link' in message
+        (level, message, values), = play(partner, node, [scans[1]])
+        assert (level, values['processed']) == (OK, '2'), message
+        partner.spin_until(lambda: partner.odometry)
+        assert node.stop() == 0
+
+
 @pytest.mark.skipif(INSTALLED['tf2_ros'], reason='tf2_ros is installed')
 def test_a_base_that_nothing_leads_to_is_refused(domain):
-    ran = subprocess.run([sys.executable, '-m', 'sgor_ros.ros.node', '--ros-args', '-p',
+    ran = subprocess.run([sys.executable, '-m', 'sgor_ros.ros.main', '--ros-args', '-p',
                           'base_frame:=base_link'], env=domain.environment(), cwd=ROOT,
                          capture_output=True, text=True, timeout=60)
     assert ran.returncode == 2

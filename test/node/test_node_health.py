@@ -15,8 +15,8 @@ from std_srvs.srv import Trigger
 from sgor_ros.io.frames import parse_transform
 from sgor_ros.io.messages import matrix_of
 from sgor_ros.io.messages import pose
-from sgor_ros.ros.gaps import Gaps
-from sgor_ros.ros.player import NodeProcess
+from sgor_ros.ros.input.stamp_gaps import StampGaps
+from sgor_ros.ros.playback.node_process import NodeProcess
 from sgor_ros.ros.types import ros_type
 
 OK, WARN, ERROR, STALE = b'\x00', b'\x01', b'\x02', b'\x03'
@@ -93,7 +93,7 @@ def test_scans_that_never_came_are_counted_by_their_stamps(pair, scans):
     # from 10 to 5 Hz: some are taken for lost until the new rate is known
     ([1] * 20 + [2] * 60, 10)])
 def test_gaps_between_stamps(steps, missed):
-    gaps = Gaps()
+    gaps = StampGaps()
     for stamp in np.cumsum([0, *steps]) * PERIOD_NS:
         gaps.take(int(stamp))
     assert gaps.missed == missed
@@ -188,7 +188,7 @@ def test_qos_overrides_work(pair):
     ('qos_overrides./odometry.publisher.reliability:=quick', 'qos_overrides./odometry'),
     ('qos_overrides./points.subscription.history:=none', 'qos_overrides./points')])
 def test_qos_overrides_that_cannot_work_are_refused(domain, override, words):
-    ran = subprocess.run([sys.executable, '-m', 'sgor_ros.ros.node', '--ros-args', '-p', override],
+    ran = subprocess.run([sys.executable, '-m', 'sgor_ros.ros.main', '--ros-args', '-p', override],
                          env=domain.environment(), capture_output=True, text=True, timeout=240)
     assert ran.returncode == 2
     assert 'Traceback' not in ran.stderr
@@ -200,7 +200,7 @@ TWO_NODES = """
 import sys, rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
-from sgor_ros.ros.sgor_node import SgorNode
+from sgor_ros.ros.node import SgorNode
 rclpy.init()
 executor = SingleThreadedExecutor()
 nodes = [SgorNode('sgor_' + name, namespace=name,

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import ros_helpers as ros
 
-from sgor_ros.ros.player import NodeProcess
+from sgor_ros.ros.playback.node_process import NodeProcess
 from sgor_ros.world import Lidar
 from sgor_ros.world import simulate
 

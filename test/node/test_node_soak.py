@@ -9,8 +9,8 @@ from ros_helpers import street
 from sgor_ros.commands.demo import forth_and_back
 from sgor_ros.io.messages import matrix_of
 from sgor_ros.io.messages import stamp_ns_of
-from sgor_ros.ros.player import Domain
-from sgor_ros.ros.player import NodeProcess
+from sgor_ros.ros.playback.domain import Domain
+from sgor_ros.ros.playback.node_process import NodeProcess
 
 SCANS = int(os.environ.get('SGOR_SOAK', '200'))
 ROUND = 40

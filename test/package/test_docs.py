@@ -11,6 +11,7 @@ from conftest import errors
 from conftest import relative
 import numpy as np
 import pytest
+from test_layers import CORE
 
 from sgor_ros import api
 from sgor_ros import register
@@ -22,7 +23,10 @@ from sgor_ros.world import Lidar
 from sgor_ros.world import scenes
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGES = [ROOT / 'README.md', *sorted((ROOT / 'docs').glob('*.md'))]
+PAGES = [ROOT / 'README.md', ROOT / 'CONTRIBUTING.md', *sorted((ROOT / 'docs').glob('*.md'))]
+FILES = [path.relative_to(ROOT).as_posix()
+         for folder in ('sgor_ros', 'test', 'scripts', 'examples')
+         for path in (ROOT / folder).rglob('*.py')]
 
 
 def code_of(page):
@@ -59,6 +63,45 @@ def test_defaults_are_not_written_down_again(page):
                      for item in config.settings())
     again = re.findall(rf'`({names})`,? \(\d[^)]*\)', page.read_text())
     assert not again, 'parameters.md has the default of each, out of the code'
+
+
+def named_files(text):
+    """Return the Python files that a text names, by the end of their paths."""
+    return re.findall(r'`([\w/]+\.py)`', text)
+
+
+def paths_of(name):
+    return [path for path in FILES if path == name or path.endswith(f'/{name}')]
+
+
+@pytest.mark.parametrize('page', [page for page in PAGES if page.name != 'lab_log.md'],
+                         ids=lambda page: page.name)
+def test_files_that_a_page_names_are_there(page):
+    text = re.sub(r'```.*?```', '', page.read_text(), flags=re.DOTALL)
+    if page.name == 'finding.md':    # its last column is of before
+        text = re.sub(r'\|[^|]*\|$', '', text, flags=re.MULTILINE)
+    for name in named_files(text):
+        # a reader's own
+        assert paths_of(name) or name == 'mine.py', name
+
+
+def test_words_of_the_glossary_live_where_it_says():
+    text = (ROOT / 'docs/glossary.md').read_text().partition('## Old words')[0]
+    rows = [row for row in re.findall(r'^\|.*\|$', text, re.MULTILINE) if '.py`' in row]
+    assert len(rows) > 35
+    for row in rows:
+        for place in row.split('|')[3].split(';'):
+            path, = paths_of('sgor_ros/' + named_files(place)[0])
+            source = (ROOT / path).read_text()
+            for name in re.findall(r'`(\w+)`', place):
+                assert re.search(rf'\b{name}\b', source), f'{path}: {name}'
+
+
+def test_the_picture_of_core_has_the_order_of_its_rooms():
+    picture = re.search(r'## The rooms of core.*?```text\n(.*?)```',
+                        (ROOT / 'docs/design.md').read_text(), re.DOTALL).group(1)
+    lines = [line[:32].split() for line in picture.splitlines() if line[0] != ' ']
+    assert [room for line in reversed(lines) for room in line] == list(CORE)
 
 
 class Links(HTMLParser):

@@ -9,7 +9,7 @@ import pytest
 import sgor_ros
 
 PACKAGE = Path(sgor_ros.__file__).parent
-SHELLS = {'io', 'visualize', 'ros', 'commands', 'evaluation'}
+SHELLS = {'io', 'pipeline', 'visualize', 'ros', 'commands', 'evaluation'}
 ROS = {'rclpy', 'ament_index_python', 'launch', 'launch_ros', 'sensor_msgs', 'nav_msgs',
        'geometry_msgs', 'visualization_msgs', 'diagnostic_msgs', 'std_msgs', 'std_srvs',
        'builtin_interfaces', 'rcl_interfaces', 'tf2_msgs', 'tf2_ros'}
@@ -23,9 +23,10 @@ MAY_IMPORT = {
     'api': {'core', 'tracker'},
     'io': {'core', 'tracker'},
     'evaluation': {'core', 'tracker', 'io'},
-    'ros': {'core', 'tracker', 'io'},
+    'pipeline': {'core', 'tracker', 'io'},
+    'ros': {'core', 'tracker', 'io', 'pipeline'},
     'visualize': {'core', 'tracker'},
-    'commands': {'core', 'tracker', 'io', 'evaluation', 'ros', 'visualize', 'world'},
+    'commands': {'core', 'tracker', 'io', 'pipeline', 'evaluation', 'ros', 'visualize', 'world'},
     'world': set(),
 }
 
@@ -93,6 +94,33 @@ def test_rooms_lie_on_each_other(path):
         if name.startswith(f'sgor_ros.{layer}.'):
             other = name.split('.')[2]
             assert other == room or other in below, f'{room} imports {name}'
+
+
+PIPELINE_ONLY = {'sgor_ros.io.frames.OdomFrame', 'sgor_ros.io.pointcloud2.decode',
+                 'sgor_ros.io.messages.relative_pose', 'sgor_ros.io.messages.odometry',
+                 'sgor_ros.io.messages.pose_stamped',
+                 'sgor_ros.io.messages.correspondence_markers'}
+
+
+@pytest.mark.parametrize('path', [path for path in SOURCES if layer_of(path) in {
+    'ros', 'commands'}], ids=lambda path: str(path.relative_to(PACKAGE)))
+def test_only_the_pipeline_decodes_places_and_makes_messages(path):
+    """Node and replay have one implementation of the way of a scan."""
+    assert not imports_of(path) & PIPELINE_ONLY
+    used = {f'sgor_ros.io.messages.{node.attr}' for node in ast.walk(ast.parse(path.read_text()))
+            if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name)
+            and node.value.id == 'messages'}
+    assert not used & PIPELINE_ONLY
+
+
+def test_the_rooms_of_the_node_do_not_know_the_node():
+    """The process, the node and its services lie on input, output and diagnostics."""
+    above = tuple(f'sgor_ros.ros.{name}.' for name in ('main', 'node', 'services'))
+    rooms = [path for path in SOURCES if path.is_relative_to(PACKAGE / 'ros')
+             and path.parent != PACKAGE / 'ros']
+    assert len(rooms) > 10
+    for path in rooms:
+        assert not [name for name in imports_of(path) if name.startswith(above)], path
 
 
 def test_the_public_interface_is_core_and_tracker():

@@ -15,7 +15,7 @@ import ros_helpers as ros
 
 import sgor_ros
 from sgor_ros.io.messages import matrix_of
-from sgor_ros.ros.player import Domain
+from sgor_ros.ros.playback.domain import Domain
 from sgor_ros.world import Lidar
 from sgor_ros.world import simulate
 

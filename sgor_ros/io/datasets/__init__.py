@@ -11,9 +11,12 @@ from . import rellis
 from . import scans
 from . import semantickitti
 from .drive import Drive
-from .drive import Frame
+from .drive import DriveScan
 
-__all__ = ['Drive', 'Frame', 'open_drive', 'open_drives']
+__all__ = ['Drive', 'DriveScan', 'Frame', 'open_drive', 'open_drives']
+
+Frame = DriveScan
+"""Its name before: evaluation still says so."""
 
 LAYOUTS: tuple[ModuleType, ...] = (nuscenes, semantickitti, rellis, helipr, mulran)
 """Those that the names of folders tell; whatever else holds scans is a folder of scans."""

@@ -1,6 +1,12 @@
-"""The labelled clouds of a bag, in any order."""
+"""The labelled clouds of a bag: one after the other, or in any order."""
+from collections.abc import Iterator
+from functools import cached_property
 from functools import partial
+import os
 from pathlib import Path
+import threading
+from typing import Any
+import weakref
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,16 +16,97 @@ from ...core.config import SgorConfig
 from ...core.scan.scan import SemanticScan
 from ..bags import BagReader
 from ..bags import is_bag as recognises
+from ..bags import RecordedCloud
 from ..label_field import AUTO
-from ..label_field import label_field_of
-from ..pointcloud2 import decode
+from ..sequence import scan_of_cloud
+from ..sequence import StampedScan
 from .drive import Drive
-from .drive import Frame
+from .drive import DriveScan
 
-__all__ = ['drives', 'recognises']
+__all__ = ['BagSequence', 'drives', 'recognises']
 
 TRUTH_TOPIC = '/ground_truth'
 """Of the poses that `sgor_kitti_to_bag` writes."""
+
+
+class BagSequence:
+    """The clouds of one topic of an open bag, in the order of recording: a `ScanSequence`.
+
+    Parameters
+    ----------
+    bag : BagReader
+        Open as long as the sequence is iterated over.
+    topic : str
+    label_field : str
+        As `label_field_of` takes it.
+
+    Attributes
+    ----------
+    name : str
+        The topic.
+    expected : int
+        How many clouds the bag claims to have.
+    label_convention : None
+        No bag tells.
+
+    Raises
+    ------
+    InputError
+        No such topic of clouds. While iterating: a bag that breaks off.
+    """
+
+    def __init__(self, bag: BagReader, topic: str, label_field: str = AUTO) -> None:
+        self.name = topic
+        self.expected = bag.count(topic)
+        self.label_convention = None
+        self._bag = bag
+        self._label_field = label_field
+
+    def __iter__(self) -> Iterator[StampedScan]:
+        """Iterate over the scans; reading one whose message is broken raises InputError."""
+        for cloud in self._bag.clouds(self.name):
+            yield _scan_of(cloud, self._label_field)
+
+    @cached_property
+    def T_world_sensor(self) -> NDArray[np.float64] | None:
+        """Poses of odometry on ``/ground_truth``, if there is one for each cloud.
+
+        The bag is read through for its stamps.
+        """
+        return _true_poses(self._bag, [scan.stamp_ns for scan in self])
+
+
+class _OpenBag:
+    """A bag for random access: opened at the first use, and open until it is forgotten.
+
+    Threads take turns; a forked or unpickled one opens the bag for itself.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._lock = threading.Lock()
+        self._reader: BagReader | None = None
+        self._process = 0
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _OpenBag, (self._path,)
+
+    def reader(self) -> BagReader:
+        """Return the open bag."""
+        if self._reader is None or self._process != os.getpid():
+            self._reader = BagReader(self._path).__enter__()
+            self._process = os.getpid()
+            weakref.finalize(self, self._reader.__exit__, None, None, None)
+        return self._reader
+
+    def read(self, topic: str, recorded_ns: int, stamp_ns: int) -> SemanticScan:
+        """Return the one scan that was recorded at a time; the stamp tells it from others."""
+        with self._lock:
+            for cloud in self.reader().clouds(topic, recorded_ns):
+                scan = _scan_of(cloud, AUTO)
+                if scan.stamp_ns == stamp_ns:
+                    return scan.read()
+        raise InputError(f'{self._path}: the cloud of {topic} at {stamp_ns} is gone')
 
 
 def drives(path: Path, name: str) -> list[Drive]:
@@ -33,38 +120,43 @@ def drives(path: Path, name: str) -> list[Drive]:
     InputError
         A bag that cannot be read, or no clouds in it.
     """
-    with BagReader(path) as bag:
-        topics = list(bag.cloud_topics())
-        if len(topics) != 1:
-            try:
-                topics = [bag.find_topic(AUTO)]
-            except InputError:
-                if not topics:
-                    raise
-        truth = dict(bag.poses(TRUTH_TOPIC))
-        return [_drive(bag, topic, name if len(topics) == 1 else f'{name}{topic}', truth)
-                for topic in topics]
-
-
-def _drive(bag: BagReader, topic: str, name: str, truth: dict[int, NDArray[np.float64]]) -> Drive:
-    frames, stamps = [], []
-    for index, cloud in enumerate(bag.clouds(topic)):
+    bag = _OpenBag(path)
+    topics = list(bag.reader().cloud_topics())
+    if len(topics) != 1:
         try:
-            stamp_ns = cloud.read()[0]
+            topics = [bag.reader().find_topic(AUTO)]
         except InputError:
-            stamp_ns = cloud.bag_time_ns    # `read` of its frame says what is wrong
-        frames.append(Frame(f'{name}/{index:06d}', 'bag', SgorConfig().label_convention,
-                            partial(_read, bag.path, topic, cloud.bag_time_ns, stamp_ns)))
-        stamps.append(stamp_ns)
-    ordered = bool((np.diff(stamps) > 0).all())
-    known = bool(truth) and all(stamp in truth for stamp in stamps)
-    return Drive(name, frames, np.array([truth[stamp] for stamp in stamps]) if known else None,
-                 stamps_ns=np.array(stamps, np.int64) if ordered else None)
+            if not topics:
+                raise
+    return [_drive(bag, topic, name if len(topics) == 1 else f'{name}{topic}')
+            for topic in topics]
 
 
-def _read(path: Path, topic: str, bag_time_ns: int, stamp_ns: int) -> SemanticScan:
-    """Read the one cloud that was recorded at a time; the stamp tells it from others."""
-    with BagReader(path) as bag:
-        found = [cloud.read() for cloud in bag.clouds(topic, bag_time_ns)]
-    message = next((each[2] for each in found if each[0] == stamp_ns), found[0][2])
-    return decode(message, label_field_of(message, AUTO))
+def _drive(bag: _OpenBag, topic: str, name: str) -> Drive:
+    sequence = BagSequence(bag.reader(), topic)
+    times = [(scan.arrived_ns, scan.stamp_ns) for scan in sequence]
+    scans = [DriveScan(f'{name}/{index:06d}', 'bag', SgorConfig().label_convention,
+                       partial(bag.read, topic, *both)) for index, both in enumerate(times)]
+    stamps = np.array([stamp_ns for _, stamp_ns in times], np.int64)
+    return Drive(name, scans, _true_poses(bag.reader(), stamps.tolist()),
+                 stamps_ns=stamps if (np.diff(stamps) > 0).all() else None)
+
+
+def _true_poses(bag: BagReader, stamps_ns: list[int]) -> NDArray[np.float64] | None:
+    truth = dict(bag.poses(TRUTH_TOPIC))
+    poses = [truth[stamp_ns] for stamp_ns in stamps_ns if stamp_ns in truth]
+    return np.array(poses) if 0 < len(poses) == len(stamps_ns) else None
+
+
+def _scan_of(cloud: RecordedCloud, label_field: str) -> StampedScan:
+    """Return the scan of a cloud; of a broken one, when it was recorded, and why it is broken."""
+    try:
+        message = cloud.read()[2]
+    except InputError as error:
+        return StampedScan(cloud.bag_time_ns, '', partial(_refuse, str(error)),
+                           cloud.bag_time_ns)
+    return scan_of_cloud(message, label_field, cloud.bag_time_ns)
+
+
+def _refuse(reason: str) -> SemanticScan:
+    raise InputError(reason)

@@ -11,7 +11,7 @@ from ...core.common.settings import InputError
 from ...core.config import SgorConfig
 from ...core.scan.scan import SemanticScan
 from .drive import Drive
-from .drive import Frame
+from .drive import DriveScan
 from .files import files_in
 from .files import stamps_of_names
 
@@ -47,11 +47,11 @@ def _drive(path: Path, name: str) -> Drive:
     stamps = stamps_of_names(scans)
     if stamps is None:
         raise InputError(f'{scans[0]}: scans of HeLiPR are named by nanoseconds')
-    frames = [Frame(f'{name}/{scan.stem}', 'helipr', SgorConfig().label_convention,
+    drive_scans = [DriveScan(f'{name}/{scan.stem}', 'helipr', SgorConfig().label_convention,
                     partial(_read, scan)) for scan in scans]
     sensor = path.resolve()
     table = sensor.parents[1] / f'LiDAR_GT/global_{sensor.name}_gt.txt'
-    return Drive(name, frames, _poses(table, stamps) if table.is_file() else None,
+    return Drive(name, drive_scans, _poses(table, stamps) if table.is_file() else None,
                  stamps_ns=stamps)
 
 

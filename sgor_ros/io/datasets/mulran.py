@@ -11,7 +11,7 @@ from ...core.common.settings import InputError
 from ...core.config import SgorConfig
 from ..scans import read_scan
 from .drive import Drive
-from .drive import Frame
+from .drive import DriveScan
 from .files import check_rigid
 from .files import files_in
 from .files import stamps_of_names
@@ -37,11 +37,11 @@ def drives(path: Path, name: str) -> list[Drive]:
     stamps = stamps_of_names(scans)
     if stamps is None:
         raise InputError(f'{scans[0]}: scans of MulRan are named by nanoseconds')
-    frames = [Frame(f'{name}/{scan.stem}', 'mulran', SgorConfig().label_convention,
+    drive_scans = [DriveScan(f'{name}/{scan.stem}', 'mulran', SgorConfig().label_convention,
                     partial(read_scan, scan)) for scan in scans]
     table = path / 'global_pose.csv'
     poses = _poses(table, stamps) if table.is_file() else None
-    return [Drive(name, frames, poses, stamps_ns=stamps)]
+    return [Drive(name, drive_scans, poses, stamps_ns=stamps)]
 
 
 def _scans(path: Path) -> Path:

@@ -12,7 +12,7 @@ from ...core.common import se3
 from ...core.common.settings import InputError
 from ..scans import read_scan
 from .drive import Drive
-from .drive import Frame
+from .drive import DriveScan
 from .files import increasing
 
 SENSOR = 'samples/LIDAR_TOP/'
@@ -61,11 +61,11 @@ def _scenes(path: Path, tables: Path) -> list[Drive]:
             files = [path / row['filename'] for row in rows]
             poses = [_matrix(ego_pose[row['ego_pose_token']])
                      @ _matrix(mount[row['calibrated_sensor_token']]) for row in rows]
-            frames = [Frame(f'{name}/{i:03d}', 'nuscenes', 'nuscenes',
+            drive_scans = [DriveScan(f'{name}/{i:03d}', 'nuscenes', 'nuscenes',
                             partial(read_scan, file, labels.get(row['token'])))
                       for i, (row, file) in enumerate(zip(rows, files, strict=True))]
             # of the vehicle only the place on a plane is known
-            found.append(Drive(name, frames, np.array(poses), False, increasing(
+            found.append(Drive(name, drive_scans, np.array(poses), False, increasing(
                 [int(row['timestamp']) * 1000 for row in rows], tables, files)))
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         if isinstance(error, InputError):

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from ..scans import read_scan
 from .drive import Drive
-from .drive import Frame
+from .drive import DriveScan
 from .files import calibration
 from .files import files_in
 from .files import read_poses
@@ -20,11 +20,11 @@ def recognises(path: Path) -> bool:
 def drives(path: Path, name: str) -> list[Drive]:
     """Return the one drive of a sequence; ``poses.txt`` is turned by ``calib.txt``, if there."""
     scans = files_in(path / SCANS, '.bin')
-    frames = []
+    drive_scans = []
     for scan in scans:
         labels = path / LABELS / f'{scan.stem}.label'
-        frames.append(Frame(f'{name}/{scan.stem}', 'rellis', 'rellis', partial(
+        drive_scans.append(DriveScan(f'{name}/{scan.stem}', 'rellis', 'rellis', partial(
             read_scan, scan, labels if labels.is_file() else None)))
     poses = path / 'poses.txt'
-    return [Drive(name, frames, read_poses(poses, scans, calibration(path))
+    return [Drive(name, drive_scans, read_poses(poses, scans, calibration(path))
                   if poses.is_file() else None)]

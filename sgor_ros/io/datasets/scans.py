@@ -6,7 +6,7 @@ from ...core.config import SgorConfig
 from ..scans import read_scan
 from ..scans import READERS
 from .drive import Drive
-from .drive import Frame
+from .drive import DriveScan
 from .files import calibration
 from .files import in_order
 from .files import read_poses
@@ -26,13 +26,13 @@ def drives(path: Path, name: str) -> list[Drive]:
     those of the LiDAR, ``times.txt`` its seconds; scans may be named by their nanoseconds.
     """
     scans = _scans(path)
-    frames = []
+    drive_scans = []
     for scan in scans:
         labels = scan.with_suffix('.label')
-        frames.append(Frame(f'{name}/{scan.stem}', 'scans', SgorConfig().label_convention,
+        drive_scans.append(DriveScan(f'{name}/{scan.stem}', 'scans', SgorConfig().label_convention,
                             partial(read_scan, scan, labels if labels.is_file() else None)))
     times, poses = path / 'times.txt', path / 'poses.txt'
-    return [Drive(name, frames,
+    return [Drive(name, drive_scans,
                   read_poses(poses, scans, calibration(path)) if poses.is_file() else None,
                   stamps_ns=read_times(times, scans) if times.is_file()
                   else stamps_of_names(scans))]

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from ...core.config import SgorConfig
 from ..scans import read_scan
 from .drive import Drive
-from .drive import Frame
+from .drive import DriveScan
 from .files import calibration
 from .files import files_in
 from .files import partners
@@ -52,10 +52,11 @@ def sequence(path: Path, name: str, labels: str | None = None) -> Drive:
     scans = files_in(path / 'velodyne', '.bin')
     chosen = ([best_labels(scan) for scan in scans] if labels is None
               else partners(path / labels, '.label', scans))
-    frames = [frame(scan, its, f'{name}/{scan.stem}')
+    drive_scans = [drive_scan(scan, its, f'{name}/{scan.stem}')
               for scan, its in zip(scans, chosen, strict=True)]
     stamps = read_times(path / 'times.txt', scans) if (path / 'times.txt').is_file() else None
-    return Drive(name, frames, _poses(path, scans), frames[0].data_set != 'nuscenes', stamps)
+    return Drive(name, drive_scans, _poses(path, scans), drive_scans[0].data_set != 'nuscenes',
+                 stamps)
 
 
 def _poses(path: Path, scans: list[Path]) -> NDArray[np.float64] | None:
@@ -67,17 +68,21 @@ def _poses(path: Path, scans: list[Path]) -> NDArray[np.float64] | None:
     return read_poses(shared, scans, path / 'calib.txt') if shared.is_file() else None
 
 
-def frame(scan: Path, labels: Path | None, name: str) -> Frame:
+def drive_scan(scan: Path, labels: Path | None, name: str) -> DriveScan:
     """Describe a scan in files; what its labels mean follows from their folder and size."""
     convention = SgorConfig().label_convention
     if labels is not None and labels.is_file():
         one_byte = labels.stat().st_size * BYTES_PER_POINT == scan.stat().st_size
         convention = 'nuscenes' if one_byte else LABEL_FOLDERS.get(labels.parent.name, convention)
     data_set = 'nuscenes' if convention == 'nuscenes' else 'kitti'
-    return Frame(name, data_set, convention, partial(read_scan, scan, labels))
+    return DriveScan(name, data_set, convention, partial(read_scan, scan, labels))
 
 
 def best_labels(scan: Path) -> Path | None:
     """Return the labels of a scan, by hand before predicted ones; None where it has none."""
     candidates = (scan.parents[1] / folder / f'{scan.stem}.label' for folder in LABEL_FOLDERS)
     return next((path for path in candidates if path.is_file()), None)
+
+
+# its name before: evaluation still says so
+frame = drive_scan

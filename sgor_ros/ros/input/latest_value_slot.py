@@ -1,9 +1,13 @@
-"""Hand-over from the thread that receives to the thread that works: the newest scan wins."""
+"""Hand-over from the thread that receives to the thread that works: the latest value wins."""
+from collections.abc import Iterator
 import threading
 
 
-class NewestSlot[Item]:
-    """Room for one item. A newer one takes its place, and what was replaced is counted."""
+class LatestValueSlot[Item]:
+    """Room for one item. A newer one takes its place, and what was replaced is counted.
+
+    Iterating takes one item after the other, waits for each, and ends when the slot is closed.
+    """
 
     def __init__(self) -> None:
         self._changed = threading.Condition()
@@ -26,6 +30,10 @@ class NewestSlot[Item]:
             self._changed.wait_for(lambda: self._closed or self._item is not None)
             item, self._item = self._item, None
             return None if self._closed else item
+
+    def __iter__(self) -> Iterator[Item]:
+        while (item := self.take()) is not None:
+            yield item
 
     def close(self) -> None:
         """Let nobody wait any longer."""

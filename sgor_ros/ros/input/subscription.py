@@ -14,9 +14,9 @@ from rclpy.qos_overriding_options import QoSOverridingOptions
 from rclpy.subscription import Subscription
 from sensor_msgs.msg import PointCloud2
 
-from ..core.common.settings import InputError
-from .publishers import OVERRIDE_ERRORS
-from .publishers import PREFIX
+from ...core.common.settings import InputError
+from ..output.publishers import OVERRIDE_ERRORS
+from ..output.publishers import PREFIX
 
 # taken at once, so this only bridges the moments in which the receiving thread has to wait
 DEPTH = 5
@@ -32,7 +32,7 @@ def override_names(node: Node) -> list[str]:
     return [f'{PREFIX}{topic}.subscription.{kind.name.lower()}' for kind in OVERRIDES]
 
 
-class Clouds:
+class CloudSubscription:
     """Receives the clouds of `points` and hands each to `on_cloud`, on the executor's thread."""
 
     def __init__(self, node: Node, reliability: str, on_cloud: Callable[[PointCloud2], None]

@@ -1,4 +1,4 @@
-"""What others may tell the node: reset, pause, resume, set_pose."""
+"""What others may ask of the node: the services reset, pause and resume, the topic set_pose."""
 import threading
 
 from geometry_msgs.msg import PoseWithCovarianceStamped
@@ -15,8 +15,8 @@ Array = NDArray[np.float64]
 SHORTEST_QUATERNION = 0.5
 
 
-class Commands:
-    """Takes commands on the executor's thread; the worker asks for them before each scan.
+class Services:
+    """Answers on the executor's thread; the worker takes what was asked for before each scan.
 
     Attributes
     ----------

@@ -7,7 +7,7 @@ from rclpy.publisher import Publisher
 from rclpy.qos_overriding_options import InvalidQosOverridesError
 from rclpy.qos_overriding_options import QoSOverridingOptions
 
-from ..core.common.settings import InputError
+from ...core.common.settings import InputError
 
 PREFIX = 'qos_overrides.'
 # what rclpy raises for values that make no sense

@@ -1,12 +1,6 @@
 """Plays clouds to a running `sgor_node` over DDS and collects what it publishes."""
 from collections.abc import Callable
 from collections.abc import Iterable
-import os
-from pathlib import Path
-import signal
-import socket
-import subprocess
-import sys
 import time
 from types import TracebackType
 from typing import Any
@@ -21,100 +15,15 @@ from rclpy.qos import QoSProfile
 from rclpy.qos import ReliabilityPolicy
 from sensor_msgs.msg import PointCloud2
 
-from ..io.messages import stamp_ns_of
+from ...io.messages import stamp_ns_of
+from .domain import Domain
 
-# free of Linux's ephemeral ports and hardly ever chosen by hand
-DOMAINS = range(215, 233)
-CLAIM_PORT = 32100
 # a fresh machine compiles at the first start, a slow one for minutes
 START_TIMEOUT_S = 600.0
-STOP_TIMEOUT_S = 30.0
 POLL_S = 0.02
 # discovery is told to both sides, but not at the same moment
 SETTLING_S = 0.5
 DEPTH = 50
-
-
-class Domain:
-    """A ROS domain that no other player on this machine uses; close it after use.
-
-    Attributes
-    ----------
-    id : int
-    """
-
-    def __init__(self) -> None:
-        # the bound port is the claim
-        self._claim = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        for self.id in DOMAINS:
-            try:
-                self._claim.bind(('127.0.0.1', CLAIM_PORT + self.id))
-            except OSError:
-                continue
-            # read when a context is made, by this process and its children
-            os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
-            return
-        raise RuntimeError(f'all ROS domains from {DOMAINS[0]} to {DOMAINS[-1]} are taken')
-
-    def environment(self) -> dict[str, str]:
-        """Return the environment of a process in this domain."""
-        return {**os.environ, 'ROS_DOMAIN_ID': str(self.id), 'PYTHONUNBUFFERED': '1'}
-
-    def close(self) -> None:
-        """Leave it to others."""
-        self._claim.close()
-
-
-class NodeProcess:
-    """`sgor_node` as a process of its own; use it in a ``with``.
-
-    Parameters
-    ----------
-    domain : Domain
-    log : Path
-        File for what it prints.
-    arguments : sequence of str
-        ROS arguments, such as ``-p``, ``mode:=consecutive``.
-    """
-
-    def __init__(self, domain: Domain, log: Path, *arguments: str) -> None:
-        self.log = log
-        with log.open('w') as file:
-            self.process = subprocess.Popen(
-                [sys.executable, '-m', 'sgor_ros.ros.node', '--ros-args', *arguments],
-                stdout=file, stderr=subprocess.STDOUT, env=domain.environment())
-
-    def __enter__(self) -> Self:
-        """Do nothing: it runs already."""
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
-                 trace: TracebackType | None) -> None:
-        """End it whatever happened."""
-        if self.alive():
-            self.process.kill()
-        self.process.wait()
-
-    def alive(self) -> bool:
-        """Return whether it still runs."""
-        return self.process.poll() is None
-
-    def stop(self) -> int:
-        """Interrupt it as Ctrl-C does and return its exit code."""
-        self.process.send_signal(signal.SIGINT)
-        try:
-            return self.process.wait(STOP_TIMEOUT_S)
-        except subprocess.TimeoutExpired:
-            self.process.kill()
-            return self.process.wait()
-
-    def memory_mb(self) -> float:
-        """Return the memory that it holds now; NaN where the system does not tell."""
-        try:
-            pages = int(Path(f'/proc/{self.process.pid}/statm').read_text().split()[1])
-        except (OSError, ValueError, IndexError):
-            return float('nan')
-        return pages * os.sysconf('SC_PAGE_SIZE') / 1e6
 
 
 class Player:

@@ -1,5 +1,4 @@
-"""Where the sensor sits on the vehicle: base from sensor, fixed or through tf2."""
-from collections.abc import Callable
+"""The pose of the sensor on the vehicle, looked up in tf2."""
 from typing import Any
 
 import numpy as np
@@ -8,24 +7,16 @@ from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.time import Time
 
-from ..core.common.settings import InputError
-from ..io.messages import matrix_of_transform
+from ...core.common.settings import InputError
+from ...io.messages import matrix_of_transform
+from ...pipeline.extrinsic import Extrinsic
 
-Array = NDArray[np.float64]
-# stamp in nanoseconds and sensor frame to (4, 4) T_base_sensor, or the reason why there is none
-Extrinsic = Callable[[int, str], Array | str]
-
-# how long a scan waits for a transform that comes after it
 PATIENCE_S = 0.05
+"""How long a scan waits for a transform that comes after it."""
 
 
-def fixed(T_base_sensor: Array) -> Extrinsic:
-    """Return the same transformation for every scan."""
-    return lambda stamp_ns, sensor_frame: T_base_sensor
-
-
-def by_tf2(node: Node, base_frame: str) -> Extrinsic:
-    """Look the transformation up at the stamp of each scan.
+def tf2_extrinsic(node: Node, base_frame: str) -> Extrinsic:
+    """Return what looks the transformation up at the stamp of each scan.
 
     Raises
     ------
@@ -41,13 +32,13 @@ def by_tf2(node: Node, base_frame: str) -> Extrinsic:
     buffer: Any = tf2_ros.Buffer(node=node)
     listener = tf2_ros.TransformListener(buffer, node)
 
-    def look_up(stamp_ns: int, sensor_frame: str) -> Array | str:
+    def look_up(stamp_ns: int, sensor_frame: str) -> NDArray[np.float64] | str:
         assert listener    # it lives as long as this function
         try:
             found = buffer.lookup_transform(
                 base_frame, sensor_frame, Time(nanoseconds=stamp_ns),
                 timeout=Duration(seconds=PATIENCE_S))
-        except tf2_ros.TransformException as error:
+        except (tf2_ros.TransformException, ValueError) as error:    # a time before 1970
             return f'no transform from {sensor_frame} to {base_frame}: {error}'
         return matrix_of_transform(found.transform)
 

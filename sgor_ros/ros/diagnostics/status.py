@@ -5,10 +5,11 @@ from diagnostic_msgs.msg import DiagnosticArray
 from diagnostic_msgs.msg import DiagnosticStatus
 from diagnostic_msgs.msg import KeyValue
 
-from ..io.messages import header
-from ..tracker import State
-from ..tracker import TrackedScan
-from .types import ros_type
+from ...io.messages import header
+from ...pipeline.outcome import Outcome
+from ...tracker import State
+from ...tracker import TrackedScan
+from ..types import ros_type
 
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
 STALE = DiagnosticStatus.STALE
@@ -46,23 +47,19 @@ def diagnostics(name: str, frame: str, stamp_ns: int, level: bytes, message: str
             values=[KeyValue(key=key, value=value) for key, value in pairs.items()])])
 
 
-def judged(tracked: TrackedScan, unplaced: str) -> tuple[bytes, str]:
-    """Return the level of a scan and why.
-
-    Parameters
-    ----------
-    tracked : TrackedScan
-    unplaced : str
-        Why its pose could not be published; empty where nothing was in the way.
-    """
+def level_of(outcome: Outcome) -> tuple[bytes, str]:
+    """Return the level of a scan and why."""
+    tracked = outcome.tracked
+    if tracked is None:
+        return ERROR, f'unusable cloud: {outcome.reason}'
     if tracked.state is State.LATE:
         return WARN, f'dropped, for it came late: {tracked.reason}'
     if not tracked.success:
         level, message = ERROR, f'registration failed: {tracked.reason}'
         if tracked.state is State.LOST:
             message = f'lost, {tracked.failures} scans without a pose: {tracked.reason}'
-    elif unplaced:
-        level, message = WARN, f'nothing is published: {unplaced}'
+    elif outcome.reason:
+        level, message = WARN, f'nothing is published: {outcome.reason}'
     elif tracked.state is State.DEGENERATE:
         level, message = WARN, 'degenerate: some directions are predicted'
     elif tracked.warnings:
@@ -72,8 +69,10 @@ def judged(tracked: TrackedScan, unplaced: str) -> tuple[bytes, str]:
     return level, '; '.join((message, *tracked.warnings))
 
 
-def details(tracked: TrackedScan) -> dict[str, str]:
-    """Return what a person wants to see of a scan, as text."""
+def details(tracked: TrackedScan | None) -> dict[str, str]:
+    """Return what a person wants to see of a scan, as text; nothing of an unusable cloud."""
+    if tracked is None:
+        return {}
     step = tracked.registration
     shown = {'state': tracked.state.value, 'track': str(tracked.track_id),
              'reason': tracked.reason}

@@ -1,4 +1,4 @@
-"""A log that tells everything and is still readable at ten scans a second."""
+"""A log that leaves repetitions out, readable at ten scans a second."""
 from collections.abc import Iterator
 from contextlib import contextmanager
 import logging
@@ -33,7 +33,7 @@ def forwarded(logger: Any) -> Iterator[None]:
         library.removeHandler(forward)
 
 
-class SparingLog:
+class ThrottledLog:
     """Passes texts on to a logger of rclpy, leaving out repetitions."""
 
     def __init__(self, logger: Any) -> None:
@@ -41,18 +41,18 @@ class SparingLog:
         self._last: dict[str, float] = {}
         self._trouble = ''
 
-    def note(self, text: str) -> None:
+    def info_once(self, text: str) -> None:
         """Inform, unless the text is empty or was passed on before."""
         if text and self._is_due(text, float('inf')):
             self._logger.info(text)
 
-    def once(self, text: str) -> None:
+    def warn_once(self, text: str) -> None:
         """Warn unless the same text was passed on before."""
         if self._is_due(text, float('inf')):
             self._logger.warning(text)
 
-    def trouble(self, text: str, where: str) -> None:
-        """Warn when trouble begins, changes or, with an empty text, ends.
+    def warn_on_change(self, text: str, where: str) -> None:
+        """Warn when the text changes: trouble begins, changes or, with an empty text, ends.
 
         What differs only in its numbers is the same trouble; trouble that comes and goes is told
         again after `PERIOD_S`.

@@ -8,27 +8,27 @@ from rclpy.clock import Clock
 from rclpy.clock import ClockType
 from rclpy.node import Node
 
+from ..output.publishers import publisher
 from . import status
-from .log import SparingLog
-from .publishers import publisher
+from .throttled_log import ThrottledLog
 
 PERIOD_S = 1.0
 
 
-class Health:
-    """Tells of each scan, and of the node when it has had none to tell of for a while.
+class DiagnosticsPublisher:
+    """Reports each scan, and what the node does when there has been none for a while.
 
     Parameters
     ----------
     node : Node
-    log : SparingLog
+    log : ThrottledLog
     counts : function
         Returns the counts of scans so far.
     idle : function
         Returns level and words for what the node does when no scan comes.
     """
 
-    def __init__(self, node: Node, log: SparingLog, counts: Callable[[], status.Counts],
+    def __init__(self, node: Node, log: ThrottledLog, counts: Callable[[], status.Counts],
                  idle: Callable[[], tuple[bytes, str]]) -> None:
         self._node = node
         self._log = log
@@ -41,10 +41,10 @@ class Health:
         # the wall's time, not the bag's, which may stand still
         node.create_timer(PERIOD_S, self._beat, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
-    def tell(self, stamp_ns: int, frame: str, level: bytes, message: str,
+    def report(self, stamp_ns: int, frame: str, level: bytes, message: str,
              values: dict[str, str]) -> None:
         """Publish what became of a scan, and log it where that is news."""
-        self._log.trouble('' if level == status.OK else message,
+        self._log.warn_on_change('' if level == status.OK else message,
                           f'scan at {stamp_ns * 1e-9:.3f} s')
         self._frame = frame
         self._publish(stamp_ns, level, message, values)

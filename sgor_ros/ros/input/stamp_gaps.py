@@ -1,4 +1,4 @@
-"""Scans that never came: the middleware drops them without a word, their stamps tell."""
+"""Scans that never came: the middleware drops them silently, gaps between stamps show it."""
 from collections import deque
 from statistics import median
 
@@ -9,7 +9,7 @@ NEEDED = 5
 LONGEST_GAP = 50
 
 
-class Gaps:
+class StampGaps:
     """Counts the scans that are missing between stamps at an otherwise steady distance."""
 
     def __init__(self) -> None:

@@ -1,4 +1,4 @@
-"""The frame around every command: its help, its exit code and what it says when it ends badly."""
+"""What every command has in common: its help, exit codes, and one line for what went wrong."""
 from argparse import ArgumentDefaultsHelpFormatter
 from argparse import ArgumentParser
 from argparse import Namespace

@@ -1,0 +1,1 @@
+"""Clouds into the node: subscription, the latest of them, and those that never came."""

@@ -1,0 +1,1 @@
+"""Results out of the node: publishers, and the transform to the base that they need."""

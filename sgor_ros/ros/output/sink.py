@@ -1,0 +1,66 @@
+"""The messages of the pipeline to the node's topics."""
+from typing import Any
+
+from rclpy.node import Node
+
+from ...core.common.settings import InputError
+from ...pipeline.sinks import CORRESPONDENCES
+from ...pipeline.sinks import ODOMETRY
+from ...pipeline.sinks import POSE
+from ...pipeline.sinks import RELATIVE_POSE
+from ...pipeline.sinks import TF
+from ..types import ros_type
+from .publishers import publisher
+
+TOPICS = {
+    ODOMETRY: ('nav_msgs/msg/Odometry', 10),
+    POSE: ('geometry_msgs/msg/PoseStamped', 10),
+    # a pose graph wants every edge
+    RELATIVE_POSE: ('nav_msgs/msg/Odometry', 100),
+    CORRESPONDENCES: ('visualization_msgs/msg/MarkerArray', 1),
+}
+"""Topic to type and depth of the queue."""
+
+TF_DEPTH = 100
+"""As tf2's broadcaster has it."""
+
+
+class TopicSink:
+    """Publishes what the pipeline makes; a `MessageSink` for the worker's thread.
+
+    Parameters
+    ----------
+    node : Node
+    tf : bool
+        Whether to publish the transform of the odometry on /tf, too.
+
+    Raises
+    ------
+    InputError
+        There is no tf2_msgs, or a QoS override with a value that is none.
+    """
+
+    types = staticmethod(ros_type)
+
+    def __init__(self, node: Node, tf: bool) -> None:
+        self._publishers = {topic: publisher(node, ros_type(kind), topic, depth)
+                            for topic, (kind, depth) in TOPICS.items()}
+        if tf:
+            self._publishers[TF] = publisher(node, _tf_message(), TF, TF_DEPTH)
+
+    def wants(self, topic: str) -> bool:
+        """Whether a topic is published; markers are dear, and made only for those who listen."""
+        return topic in self._publishers and (
+            topic != CORRESPONDENCES or self._publishers[topic].get_subscription_count() > 0)
+
+    def write(self, topic: str, message: Any, arrived_ns: int) -> None:
+        """Publish a message."""
+        self._publishers[topic].publish(message)
+
+
+def _tf_message() -> Any:
+    try:
+        return ros_type('tf2_msgs/msg/TFMessage')
+    except ModuleNotFoundError as error:
+        raise InputError('publish_tf = True: the package tf2_msgs is not installed; '
+                         'apt install ros-jazzy-tf2-msgs') from error

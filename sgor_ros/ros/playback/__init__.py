@@ -1,0 +1,1 @@
+"""Plays clouds to a running `sgor_node` over DDS: for the demo and for the tests."""
