@@ -1,4 +1,4 @@
-"""`sgor_benchmark`: SGOR and its rivals on the same scans in the same run."""
+"""`sgor_benchmark`: SGOR and other methods on the same scans in the same run."""
 from argparse import ArgumentParser
 from argparse import Namespace
 from collections.abc import Iterator
@@ -58,8 +58,8 @@ def measure(arguments: Namespace) -> int:
 
 def _parser() -> Parser:
     top = Parser(
-        'sgor_benchmark', 'COMMAND [options]', 'Measure SGOR and its rivals on your own data or '
-        'on the built-in world. Each command prints a table and writes table.md, rows.csv, '
+        'sgor_benchmark', 'COMMAND [options]', 'Measure SGOR and other methods on your own data '
+        'or on the built-in world. Each command prints a table and writes table.md, rows.csv, '
         'run.json and a plot into a new folder.',
         ('sgor_benchmark pairs --world', 'sgor_benchmark sequence --data sequences/08',
          'sgor_benchmark wrong --help'))
@@ -90,7 +90,7 @@ def _add_common(command: ArgumentParser) -> None:
 
 @contextmanager
 def _cores(count: int) -> Iterator[None]:
-    """Hold this process, and the rivals' threads with it, to some cores."""
+    """Hold this process, and the threads of all methods with it, to some cores."""
     before = os.sched_getaffinity(0)
     os.sched_setaffinity(0, sorted(before)[:count])
     try:

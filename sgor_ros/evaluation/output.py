@@ -21,7 +21,7 @@ def save(folder: Path, text: str, records: Sequence[dict[str, Any]], setup: dict
     folder : Path
         Made where there is none.
     text : str
-        Tables and what has to be said about them.
+        Tables and the rules that they follow.
     records : sequence of dict
         Lines of the CSV file.
     setup : dict

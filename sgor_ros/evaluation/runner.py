@@ -19,23 +19,21 @@ import numpy as np
 from tqdm import tqdm
 
 from ..core.common.settings import InputError
-from ..core.config import SgorConfig
 from .front_end import Features
 from .job import Job
 from .methods import Method
 from .metrics import row as table
-from .metrics.registration_recall import EASY
 from .metrics.row import Row
 from .output import describe_run
-from .protocols.kitti import INLIER_M
 from .protocols.pairs import Pair
+from .protocols.protocol import outdoor
 from .protocols.protocol import Protocol
 from .protocols.studies import Variant
 
 
 def run_pairs(pairs: Sequence[Pair], methods: Sequence[Method], seed: int) -> list[Row]:
     """Run methods on raw scans whose sources are turned, after a run of each to warm up."""
-    protocol = Protocol('pairs', pairs, (EASY,), INLIER_M, SgorConfig.kitti_protocol())
+    protocol = outdoor('pairs', pairs)
     Job(replace(protocol, pairs=pairs[:1]), Variant(), methods, turn_seed=seed)()
     return run(protocol, methods, turn_seed=seed)
 

@@ -28,9 +28,9 @@ from .methods import Method
 from .methods import sgor_on_matches
 from .metrics.pose_error import rotation_error_deg
 from .metrics.pose_error import translation_error_m
-from .protocols.kitti import INLIER_M
 from .protocols.match_files import read_set
 from .protocols.pairs import Pair
+from .protocols.protocol import INLIER_M
 
 Array = NDArray[np.float64]
 

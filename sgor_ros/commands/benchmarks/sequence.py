@@ -32,7 +32,7 @@ def add_options(command: ArgumentParser) -> None:
 
 
 def measure(arguments: Namespace, folder: Path) -> None:
-    """Compare odometries on drives, and what the tracker says of itself with the truth."""
+    """Compare odometries on drives, and the covariance that the tracker claims with the truth."""
     if find_spec('evo') is None:
         raise InputError("the errors of tracks need evo: pip install 'sgor_ros[evaluation]'")
     config = inputs.default_config(arguments)

@@ -92,7 +92,7 @@ class Answer(NamedTuple):
     seconds_one_new : float
         With one of the scans prepared before; NaN where a method cannot do that.
     result : Registration or None
-        All that SGOR says; None of other methods.
+        All that SGOR returns; None of other methods.
     """
 
     T_target_source: Array | None

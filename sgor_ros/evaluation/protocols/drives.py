@@ -3,15 +3,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from ...core.common import se3
-from ...core.config import SgorConfig
 from ...io.datasets import Drive
-from ..metrics.registration_recall import EASY
-from ..metrics.registration_recall import HARD
-from ..metrics.registration_recall import MEDIUM
-from .kitti import INLIER_M
 from .pairs import BAND_M
 from .pairs import near_pairs
 from .pairs import Pair
+from .protocol import outdoor
 from .protocol import Protocol
 
 
@@ -22,7 +18,7 @@ def posed(drives: Sequence[Drive], max_distance_m: float, listed: Sequence[Pair]
     pairs = [replace(pair, group=_band(pair.distance_m), heights_known=True)
              for pair in [*near_pairs(drives, max_distance_m), *listed]
              if pair.T_target_source is not None]
-    return Protocol('poses', pairs, (EASY, MEDIUM, HARD), INLIER_M, SgorConfig.kitti_protocol())
+    return outdoor('poses', pairs)
 
 
 def strided(drives: Sequence[Drive], strides: Sequence[int]) -> Protocol:
@@ -36,8 +32,7 @@ def strided(drives: Sequence[Drive], strides: Sequence[int]) -> Protocol:
                            se3.inverse(T[i]) @ T[i + stride],
                            name=f'{drive.name} {i + stride} {i}', group=f'stride {stride}')
                       for i in range(len(drive.frames) - stride)]
-    return Protocol('strides', pairs, (EASY, MEDIUM, HARD), INLIER_M,
-                    SgorConfig.kitti_protocol())
+    return outdoor('strides', pairs)
 
 
 def _band(distance_m: float) -> str:

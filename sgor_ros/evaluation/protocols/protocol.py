@@ -3,8 +3,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ...core.config import SgorConfig
+from ..metrics.registration_recall import EASY
+from ..metrics.registration_recall import HARD
+from ..metrics.registration_recall import MEDIUM
 from ..metrics.row import Threshold
 from .pairs import Pair
+
+INLIER_M = 0.6
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,3 +36,9 @@ class Protocol:
     inlier_m: float
     front_end: SgorConfig
     missing: int = 0
+
+
+def outdoor(name: str, pairs: Sequence[Pair], missing: int = 0) -> Protocol:
+    """Return a protocol with the thresholds, the inlier distance and the front end of KITTI's."""
+    return Protocol(name, pairs, (EASY, MEDIUM, HARD), INLIER_M, SgorConfig.kitti_protocol(),
+                    missing)

@@ -35,7 +35,7 @@ def plot_reliability_diagram(path: Path, rows: Sequence[Row], methods: Sequence[
     for (top, bottom), name in zip(grid.T, methods, strict=True):
         own = [row for row in rows if row.method == name]
         bins = reliability_diagram(own)
-        top.plot((0, 100), (0, 100), ':', color=GREY, label='says what it is')
+        top.plot((0, 100), (0, 100), ':', color=GREY, label='calibrated')
         top.plot([100 * each.mean for each in bins],
                  [100 * each.right / each.answers for each in bins], 'o-', color=BLUE,
                  label='answers, refused ones too')
