@@ -10,7 +10,7 @@ from ..evaluation.protocols.pairs import drive_of
 from ..evaluation.protocols.pairs import frame_in_memory
 from ..evaluation.protocols.pairs import Pair
 from ..io.datasets import Drive
-from ..io.datasets import Frame
+from ..io.datasets import DriveScan
 
 
 def scene_kinds(names: Sequence[str]) -> dict[str, bool]:
@@ -54,12 +54,12 @@ def scene_pairs(kind: str, count: int, seed: int) -> list[Pair]:
     rng = np.random.default_rng([seed, list(scenes.KINDS).index(kind)])
     lidar = Lidar()
     same: list[Pair] = []
-    targets: list[Frame] = []
+    targets: list[DriveScan] = []
     for index in range(count + 1):
         place = scenes.make(kind, 1000 * seed + index)
 
         def scan(pose: NDArray[np.float64], role: str, place: scenes.Place = place,
-                 index: int = index) -> Frame:
+                 index: int = index) -> DriveScan:
             return frame_in_memory(f'{kind}/{index:03d}/{role}', kind,
                                    *lidar.scan(place, pose, rng))
 

@@ -35,7 +35,7 @@ from ..evaluation.protocols.truth import refined
 from ..evaluation.report import page
 from ..evaluation.runner import run
 from ..io.datasets import Drive
-from ..io.datasets import Frame
+from ..io.datasets import DriveScan
 from ..io.datasets import open_drives
 from . import command_line
 from .benchmarks import inputs
@@ -188,12 +188,12 @@ def _kitti_loops(arguments: Namespace) -> Protocol:
     return kitti_loops(arguments.list, _finder(arguments))
 
 
-def _finder(arguments: Namespace) -> Callable[[int, int], Frame | None]:
+def _finder(arguments: Namespace) -> Callable[[int, int], DriveScan | None]:
     """Return what finds scan i of a sequence: in a folder of its number."""
     if arguments.data is None:
         raise InputError('--list needs --data: the folder of the sequences')
     drives = {d.name.rpartition('/')[2]: {frame.name.rpartition('/')[2]: frame
-                                          for frame in d.frames}
+                                          for frame in d.scans}
               for d in open_drives(arguments.data)}
     return lambda sequence, scan: drives.get(f'{sequence:02d}', {}).get(f'{scan:06d}')
 

@@ -16,7 +16,7 @@ from ..core.preprocessing import preprocess
 from ..core.scan.labels import label_convention
 from ..core.scan.labels import UNLABELLED
 from ..core.scan.scan import SemanticScan
-from ..io.datasets import Frame
+from ..io.datasets import DriveScan
 from .methods import Matches
 from .methods.sgor import random_labels
 from .protocols.pairs import Pair
@@ -33,7 +33,7 @@ class Features:
 
     folder: Path
 
-    def read(self, frame: Frame) -> tuple[NDArray[np.float64], NDArray[np.float32]]:
+    def read(self, frame: DriveScan) -> tuple[NDArray[np.float64], NDArray[np.float32]]:
         """Return the keypoints and descriptors of a scan."""
         path = self.folder / f'{frame.name}.npz'
         try:
@@ -62,7 +62,7 @@ def shared_matches(pair: Pair, config: SgorConfig, inlier_m: float, variant: Var
     return Matches(found, inlier_m, normals)
 
 
-def _prepared(frame: Frame, config: SgorConfig, variant: Variant, rng: np.random.Generator,
+def _prepared(frame: DriveScan, config: SgorConfig, variant: Variant, rng: np.random.Generator,
               features: Features | None) -> PreparedScan:
     scan = frame.read()
     labels = scan.labels

@@ -61,17 +61,17 @@ def run_drive(drive: Drive, makers: dict[str, Callable[[], Step]], config: SgorC
               ) -> list[Track]:
     """Track a drive that has true poses by each odometry."""
     assert drive.T_world_sensor is not None
-    truth = drive.T_world_sensor[:len(drive.frames)]
+    truth = drive.T_world_sensor[:len(drive.scans)]
     warm_up(config)
     for make in makers.values():
         step = make()
-        for frame in drive.frames[:2]:
+        for frame in drive.scans[:2]:
             step(frame.read())
     odometry = {name: make() for name, make in makers.items()}
     poses: dict[str, list[Array | None]] = {name: [] for name in makers}
     seconds: dict[str, list[tuple[float, float]]] = {name: [] for name in makers}
     rng = np.random.default_rng(0)
-    for frame in tqdm(drive.frames, drive.name, unit='scan', disable=None):
+    for frame in tqdm(drive.scans, drive.name, unit='scan', disable=None):
         scan = frame.read()
         for name in rng.permutation(list(makers)):
             start, cpu_start = time.perf_counter(), time.process_time()

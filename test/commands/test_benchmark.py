@@ -24,6 +24,7 @@ from sgor_ros.evaluation.protocols.pairs import Pair
 from sgor_ros.evaluation.report import tables
 from sgor_ros.evaluation.runner import run_pairs
 from sgor_ros.io.datasets import Drive
+from sgor_ros.io.datasets import DriveScan
 from sgor_ros.io.datasets import open_drives
 from sgor_ros.io.trajectories import write_kitti
 
@@ -76,10 +77,10 @@ def median_distance(pair, T):
 def test_drives_of_a_user_have_poses_of_the_sensor(sequences_folder, street):
     drives = open_drives(sequences_folder)
     assert [drive.name for drive in drives] == ['sequences/00', 'sequences/01']
-    assert [len(drive.frames) for drive in drives] == [4, 2]
+    assert [len(drive.scans) for drive in drives] == [4, 2]
     truth = np.linalg.inv(street[0][2]) @ street[3][2]
     assert np.allclose(drives[0].T_world_sensor[3], truth, atol=1e-6)
-    scan = drives[0].frames[2].read()
+    scan = drives[0].scans[2].read()
     assert np.array_equal(scan.points, street[2][0])
     assert np.array_equal(scan.labels, street[2][1])
 
@@ -102,7 +103,7 @@ def test_a_drive_may_be_the_folder_itself(sequences_folder):
 def test_real_drives_and_pairs_lie_on_each_other(data_folder):
     drives = {drive.name: drive for drive in open_drives(data_folder)}
     assert {'kitti/00', 'kitti/05', 'kitti/08', 'nuscenes'} == set(drives)
-    conventions = {name: {f.label_convention for f in drive.frames}
+    conventions = {name: {f.label_convention for f in drive.scans}
                    for name, drive in drives.items()}
     assert conventions['nuscenes'] == {'nuscenes'}
     assert conventions['kitti/08'] == {'semantickitti'}
@@ -141,7 +142,7 @@ def apart(x):
 
 
 def frame(data_set, name='f'):
-    return pairing.Frame(name, data_set, 'semantickitti', lambda: None)
+    return DriveScan(name, data_set, 'semantickitti', lambda: None)
 
 
 def test_wrong_pairs_are_of_different_places():

@@ -35,7 +35,7 @@ def test_another_method_finds_an_easy_pair(name, drive):
 
 def test_fast_global_registration_finds_a_cloud_in_itself(drive):
     pytest.importorskip('open3d')
-    frame = drive.frames[0]
+    frame = drive.scans[0]
     scans, truth = turned(pairing.Pair(frame, frame, np.eye(4)), seed=1)
     answer = ON_SCANS['fgr'].on_scans(scans)
     assert rotation_error_deg(answer.T_target_source, truth) < 5
@@ -46,7 +46,7 @@ def test_fast_global_registration_finds_a_cloud_in_itself(drive):
 def test_an_odometry_follows_the_street(make, drive):
     pytest.importorskip('kiss_icp')
     step = make()
-    poses = [step(frame.read().points) for frame in drive.frames]
+    poses = [step(frame.read().points) for frame in drive.scans]
     first = np.linalg.inv(poses[0])
     truth = np.linalg.inv(drive.T_world_sensor[0]) @ drive.T_world_sensor[-1]
     assert np.linalg.norm(truth[:3, 3]) > 4

@@ -123,11 +123,11 @@ def test_listed_pairs_are_found_by_sequence_and_scan(tmp_path, drive):
     truth = ' '.join(map(str, np.eye(4).ravel()))
     path = tmp_path / 'kitti_loops_0_10.txt'
     path.write_text(f'header\n0 1 0 3 {truth}\n0 1 0 99 {truth}\n')
-    found = kitti_loops([path], lambda s, i: drive.frames[i] if i < 6 else None)
+    found = kitti_loops([path], lambda s, i: drive.scans[i] if i < 6 else None)
     pair, = found.pairs
     assert (pair.name, pair.group, found.missing) == ('00 1 00 3', '0-10 m', 1)
-    assert pair.source is drive.frames[1]
-    assert pair.target is drive.frames[3]
+    assert pair.source is drive.scans[1]
+    assert pair.target is drive.scans[3]
 
 
 def test_truth_of_made_pairs(drive):
@@ -140,7 +140,7 @@ def test_truth_of_made_pairs(drive):
     assert len(strides.pairs) == 4
     for protocol in (by_rule, strides, posed([drive], 7.0)):
         for pair in protocol.pairs:
-            i, j = drive.frames.index(pair.source), drive.frames.index(pair.target)
+            i, j = drive.scans.index(pair.source), drive.scans.index(pair.target)
             assert pair.T_target_source == pytest.approx(np.linalg.inv(T[j]) @ T[i])
 
 
@@ -310,7 +310,7 @@ def test_refined_truth_is_kept(tmp_path):
     from sgor_ros.io.datasets import open_drives
     drive, = open_drives(DATA / 'kitti/08')
     T = drive.T_world_sensor
-    pair = strided([replace(drive, T_world_sensor=T[:len(drive.frames)])], [3]).pairs[0]
+    pair = strided([replace(drive, T_world_sensor=T[:len(drive.scans)])], [3]).pairs[0]
     off = replace(pair, T_target_source=se3.compose(np.eye(3), np.array([0.05, 0.05, 0.0]))
                   @ pair.T_target_source)
     cache = tmp_path / 'truth.json'

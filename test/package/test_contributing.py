@@ -93,5 +93,6 @@ import numpy as np
 from sgor_ros.evaluation.methods import available, Matches, ON_MATCHES
 points = np.random.default_rng(0).uniform(-9, 9, (50, 3))
 method = available(ON_MATCHES, lambda text: None)['median shift']
-print(*method.on_matches(Matches.of(points, points + (1, 2, 3), 0.6)).T_target_source[:3, 3].round(6))""")
+answer = method.on_matches(Matches.of(points, points + (1, 2, 3), 0.6))
+print(*answer.T_target_source[:3, 3].round(6))""")
     assert [float(each) for each in told.split()] == [1, 2, 3]

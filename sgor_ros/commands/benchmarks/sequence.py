@@ -37,8 +37,8 @@ def measure(arguments: Namespace, folder: Path) -> None:
         raise InputError("the errors of tracks need evo: pip install 'sgor_ros[evaluation]'")
     config = inputs.default_config(arguments)
     drives = [drive for drive in inputs.data_drives(arguments) if drive.T_world_sensor is not None
-              and drive.heights_known and len(drive.frames) > 1]
-    drives = [Drive(drive.name, drive.frames[:arguments.scans], drive.T_world_sensor)
+              and drive.heights_known and len(drive.scans) > 1]
+    drives = [Drive(drive.name, drive.scans[:arguments.scans], drive.T_world_sensor)
               for drive in drives if arguments.scans > 1]
     if inputs.wants_world(arguments) and arguments.scans > 1:
         drives.append(inputs.world_drive(arguments.seed, arguments.scans, arguments.speed))

@@ -28,10 +28,10 @@ def strided(drives: Sequence[Drive], strides: Sequence[int]) -> Protocol:
         assert drive.T_world_sensor is not None
         T = drive.T_world_sensor
         for stride in strides:
-            pairs += [Pair(drive.frames[i + stride], drive.frames[i],
+            pairs += [Pair(drive.scans[i + stride], drive.scans[i],
                            se3.inverse(T[i]) @ T[i + stride],
                            name=f'{drive.name} {i + stride} {i}', group=f'stride {stride}')
-                      for i in range(len(drive.frames) - stride)]
+                      for i in range(len(drive.scans) - stride)]
     return outdoor('strides', pairs)
 
 

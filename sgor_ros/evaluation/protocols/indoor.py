@@ -10,7 +10,7 @@ from ...core.common import se3
 from ...core.common.settings import InputError
 from ...core.config import SgorConfig
 from ...core.scan.scan import SemanticScan
-from ...io.datasets import Frame
+from ...io.datasets import DriveScan
 from ...io.scans import read_scan
 from ..methods.interface import INDOOR_M
 from ..metrics.registration_recall import INDOOR
@@ -101,9 +101,9 @@ def cloud_of_depth(depth_m: NDArray[np.float64], K: Array) -> tuple[Array, NDArr
     return np.column_stack(((u - K[0, 2]) * z / K[0, 0], (v - K[1, 2]) * z / K[1, 1], z)), seen
 
 
-def _depth(path: Path, K: Array) -> Frame:
+def _depth(path: Path, K: Array) -> DriveScan:
     labels = Path(str(path).replace('.depth.png', '.label.png'))
-    return Frame(path.stem, '3dmatch', 'semantickitti',
+    return DriveScan(path.stem, '3dmatch', 'semantickitti',
                  partial(_read_depth, path, labels if labels.is_file() else None, K))
 
 
@@ -115,8 +115,8 @@ def _read_depth(path: Path, labels: Path | None, K: Array) -> SemanticScan:
                         else np.asarray(Image.open(labels)).astype(np.int64)[seen])
 
 
-def _fragment(path: Path) -> Frame:
-    return Frame(path.stem, '3dmatch', 'semantickitti', partial(read_scan, path))
+def _fragment(path: Path) -> DriveScan:
+    return DriveScan(path.stem, '3dmatch', 'semantickitti', partial(read_scan, path))
 
 
 def _scene(log: Path) -> tuple[str, Path]:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ...core.common import se3
 from ...core.common.settings import InputError
 from ...io.datasets import Drive
-from ...io.datasets import Frame
+from ...io.datasets import DriveScan
 from ..metrics.registration_recall import EASY
 from ..metrics.registration_recall import LOOPS
 from .pairs import Pair
@@ -29,7 +29,7 @@ KNOWN_BAD = (8, 15, 58)
 COLUMNS = 20
 """Of a list: sequence and scan of the source, of the target, and T_target_source."""
 
-Finder = Callable[[int, int], Frame | None]
+Finder = Callable[[int, int], DriveScan | None]
 """Sequence and scan to the frame; None where it is not there."""
 
 
@@ -86,9 +86,9 @@ def kitti_10m(drives: Sequence[Drive], positions: Sequence[Array]) -> Protocol:
     for drive, where in zip(drives, positions, strict=True):
         assert drive.T_world_sensor is not None
         T = drive.T_world_sensor
-        pairs += [Pair(drive.frames[i], drive.frames[j], se3.inverse(T[j]) @ T[i],
+        pairs += [Pair(drive.scans[i], drive.scans[j], se3.inverse(T[j]) @ T[i],
                        name=f'{drive.name} {i} {j}', group=drive.name)
-                  for i, j in ten_metre_pairs(where[:len(drive.frames)])
+                  for i, j in ten_metre_pairs(where[:len(drive.scans)])
                   if (drive.name.rpartition('/')[2], i, j) != (f'{KNOWN_BAD[0]:02d}',
                                                               *KNOWN_BAD[1:])]
     return outdoor('kitti_10m', pairs)

@@ -17,7 +17,7 @@ from ...core.common import se3
 from ...core.common.settings import InputError
 from ...core.scan.scan import SemanticScan
 from ...io.datasets import Drive
-from ...io.datasets import Frame
+from ...io.datasets import DriveScan
 from ...io.datasets.semantickitti import frame
 from ..methods import Matches
 
@@ -35,7 +35,7 @@ class Pair:
 
     Attributes
     ----------
-    source, target : Frame or None
+    source, target : DriveScan or None
         None where there are matches only.
     T_target_source : (4, 4) float64 or None
         The truth; None where the scans are of different drives.
@@ -51,8 +51,8 @@ class Pair:
         Where they come from a file, in place of scans.
     """
 
-    source: Frame | None
-    target: Frame | None
+    source: DriveScan | None
+    target: DriveScan | None
     T_target_source: Array | None
     right: bool = True
     heights_known: bool = True
@@ -66,7 +66,7 @@ class Pair:
             object.__setattr__(self, 'name', f'{source.name} {target.name}')
 
     @property
-    def scans(self) -> tuple[Frame, Frame]:
+    def scans(self) -> tuple[DriveScan, DriveScan]:
         """Source and target of a pair of scans."""
         assert self.source is not None
         assert self.target is not None
@@ -85,9 +85,9 @@ class Pair:
 
 
 def frame_in_memory(name: str, data_set: str, points: NDArray[np.float32],
-                    labels: NDArray[np.uint32]) -> Frame:
+                    labels: NDArray[np.uint32]) -> DriveScan:
     """Describe a scan in memory: points (N, 3), raw SemanticKITTI labels (N,)."""
-    return Frame(name, data_set, 'semantickitti', partial(SemanticScan, points, labels))
+    return DriveScan(name, data_set, 'semantickitti', partial(SemanticScan, points, labels))
 
 
 def drive_of(name: str, scans: Iterable[tuple[NDArray[np.float32], NDArray[np.uint32], Array]]
@@ -106,9 +106,9 @@ def near_pairs(drives: Sequence[Drive], max_distance_m: float) -> list[Pair]:
     for drive in drives:
         if drive.T_world_sensor is None:
             continue
-        T = drive.T_world_sensor[:len(drive.frames)]
+        T = drive.T_world_sensor[:len(drive.scans)]
         for i, j in sorted(cKDTree(T[:, :3, 3]).query_pairs(max_distance_m)):
-            pairs.append(Pair(drive.frames[j], drive.frames[i], se3.inverse(T[i]) @ T[j],
+            pairs.append(Pair(drive.scans[j], drive.scans[i], se3.inverse(T[i]) @ T[j],
                               heights_known=drive.heights_known))
     return pairs
 
@@ -153,7 +153,7 @@ def wrong_pairs(drives: Sequence[Drive], count: int, seed: int) -> list[Pair]:
 
     Scans of one drive count as different places where they are over `NO_OVERLAP_M` apart.
     """
-    kinds = [[Pair(a, b, None, right=False) for a in one.frames for b in other.frames]
+    kinds = [[Pair(a, b, None, right=False) for a in one.scans for b in other.scans]
              for one, other in combinations(drives, 2)]
     kinds += [far for drive in drives if (far := list(_far_pairs(drive)))]
     return _in_turns(kinds, count, seed)
@@ -171,7 +171,7 @@ def _far_pairs(drive: Drive) -> Iterator[Pair]:
     if drive.T_world_sensor is None:
         return
     T = drive.T_world_sensor
-    for i, j in combinations(range(len(drive.frames)), 2):
+    for i, j in combinations(range(len(drive.scans)), 2):
         if np.linalg.norm(T[i, :3, 3] - T[j, :3, 3]) > NO_OVERLAP_M:
-            yield Pair(drive.frames[j], drive.frames[i], se3.inverse(T[i]) @ T[j], right=False,
+            yield Pair(drive.scans[j], drive.scans[i], se3.inverse(T[i]) @ T[j], right=False,
                        heights_known=drive.heights_known)
