@@ -3,7 +3,7 @@
 FROM ros:jazzy
 
 RUN apt-get update && apt-get install -y --no-install-recommends python3-pip python3-numba \
-        python3-threadpoolctl && rm -rf /var/lib/apt/lists/* \
+    && rm -rf /var/lib/apt/lists/* \
     && pip install --no-cache-dir --break-system-packages 'rosbags~=0.11.0'
 
 WORKDIR /ws

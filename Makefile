@@ -2,7 +2,7 @@
 VENV := .venv
 PY := $(VENV)/bin/python
 
-.PHONY: demo test setup lint site clean
+.PHONY: demo test test-fast mutants setup lint site clean
 
 setup: $(VENV)/.ready
 
@@ -23,6 +23,18 @@ site: setup
 test: lint
 	$(PY) -m pytest
 
+# for who changes a line: no real data, no processes, one or two places of each verdict
+test-fast: setup
+	$(VENV)/bin/ruff check .
+	$(PY) -m pytest -q -m 'not slow'
+
+# changes each line that decides on a verdict and tells what no test noticed; half an hour.
+# Works in mutants/ and changes nothing else; goes on where it was stopped. One function, one
+# file: make mutants ONLY='sgor_ros.core.verdict.decision*'
+mutants: setup
+	$(PY) -m mutmut run $(ONLY)
+	$(PY) -m mutmut results
+
 clean:
-	rm -rf $(VENV) build install log out sgor_ros.egg-info .mypy_cache .pytest_cache .ruff_cache
+	rm -rf $(VENV) mutants build install log out sgor_ros.egg-info .mypy_cache .pytest_cache .ruff_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

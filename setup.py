@@ -10,16 +10,7 @@ HERE = Path(__file__).resolve().parent
 PACKAGE = ElementTree.parse(HERE / 'package.xml').getroot()
 MAINTAINER = PACKAGE.find('maintainer')
 SHARE = 'share/sgor_ros'
-COMMANDS = {
-    'sgor_node': 'sgor_ros.ros.main',
-    'sgor_replay': 'sgor_ros.commands.replay',
-    'sgor_register': 'sgor_ros.commands.register',
-    'sgor_kitti_to_bag': 'sgor_ros.commands.kitti_to_bag',
-    'sgor_benchmark': 'sgor_ros.commands.benchmark',
-    'sgor_demo': 'sgor_ros.commands.demo',
-    'sgor_warm_up': 'sgor_ros.commands.warm_up',
-    'sgor_tables': 'sgor_ros.commands.tables',
-}
+COMMANDS = ('replay', 'register', 'kitti_to_bag', 'benchmark', 'demo', 'warm_up', 'tables')
 # the built-in world; the module of open3d without CUDA
 OPEN3D = ['open3d-cpu>=0.18']
 # APE and RPE, the other methods, their matches from depth maps, and a cluster to run on
@@ -51,28 +42,28 @@ setup(
     ],
     python_requires='>=3.12',
     packages=find_packages(include=['sgor_ros', 'sgor_ros.*']),
-    package_data={'sgor_ros': ['py.typed']},
+    package_data={'sgor_ros': ['py.typed', 'core/scan/conventions/*.toml']},
     data_files=[
         ('share/ament_index/resource_index/packages', ['resource/sgor_ros']),
         (SHARE, ['package.xml']),
         (f'{SHARE}/config', glob('config/*.yaml') + glob('config/*.rviz')
          + glob('config/*.json')),
-        (f'{SHARE}/config/labels', glob('config/labels/*.yaml')),
         (f'{SHARE}/launch', glob('launch/*.py')),
     ],
     zip_safe=False,
     install_requires=[
-        'setuptools',
-        'matplotlib',
         'numba>=0.58',
         'numpy>=1.26',
-        'pyyaml',
-        'rosbags~=0.11.0',    # its 0.x releases remove names
         'scipy>=1.11',
-        'threadpoolctl>=3.0',
-        'tqdm',
     ],
     extras_require={
+        # files, bags and pictures: what the commands need beside the library
+        'commands': [
+            'matplotlib',
+            'pyyaml',
+            'rosbags~=0.11.0',    # its 0.x releases remove names
+            'tqdm',
+        ],
         # where no ROS 2 Jazzy is installed: the same rclpy with Fast DDS, as wheels
         'ros': ['ros-jazzy-rclpy[fastrtps]', 'ros-jazzy-common-interfaces'],
         'open3d': [*OPEN3D, 'evo'],    # evo: the errors that the demo shows
@@ -87,6 +78,7 @@ setup(
         'docs': ['sphinx>=8', 'numpydoc>=1.8', 'myst-parser>=4', 'furo'],
         'dev': [
             'mypy',
+            'mutmut>=3.8',
             'ruff',
             'build',
             'catkin-pkg',
@@ -95,6 +87,8 @@ setup(
         ],
     },
     entry_points={
-        'console_scripts': [f'{name} = {module}:main' for name, module in COMMANDS.items()],
+        'console_scripts': [
+            'sgor_node = sgor_ros.ros.main:main',
+            *(f'sgor_{name} = sgor_ros.commands.entry:{name}' for name in COMMANDS)],
     },
 )

@@ -1,4 +1,4 @@
-"""Class ids that nobody else has: a table of your own, `five_classes.yaml` beside this file."""
+"""Class ids that nobody else has: a table of your own, `five_classes.toml` beside this file."""
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +10,7 @@ from sgor_ros import SemanticScan
 from sgor_ros import SgorConfig
 from sgor_ros.world import simulate
 
-TABLE = Path(__file__).with_name('five_classes.yaml')
+TABLE = Path(__file__).with_name('five_classes.toml')
 # raw SemanticKITTI id -> ours; what is not listed is 0, nothing
 OURS = {40: 1, 44: 1, 48: 2, 49: 2, 72: 2, 50: 3, 51: 3, 52: 3, 70: 4, 71: 4, 10: 5}
 

@@ -1,9 +1,16 @@
-"""SGOR: global registration of labelled LiDAR scans, and the odometry built on it."""
+"""SGOR: global registration of labelled LiDAR scans, and the odometry built on it.
+
+Two scans: `register`, `preprocess`, `register_correspondences`, `warm_up`; with the types
+`SemanticScan`, `PreparedScan`, `SgorConfig`, `Registration`, `Status`, `Placement`, `InputError`.
+For keyframes that are kept: `compact`, `CompactScan`.
+Scan after scan: `Tracker`, `TrackerConfig`, `TrackedScan`, `State`.
+Data sets: `open_drive`, `open_drives`, `Drive`.
+
+Importing it loads and changes nothing; compiled code is loaded with the first of these names.
+"""
 from importlib import import_module
 from typing import Any
 from typing import TYPE_CHECKING
-
-from .cache import choose_cache_folder
 
 if TYPE_CHECKING:
     from .api import *  # noqa: F403
@@ -14,8 +21,6 @@ if TYPE_CHECKING:
 
 DATASETS = ('Drive', 'open_drive', 'open_drives')
 """What reads files, which the rest of the interface does not."""
-
-choose_cache_folder()
 
 
 def __getattr__(name: str) -> Any:
@@ -39,3 +44,8 @@ def __getattr__(name: str) -> Any:
         if name in DATASETS:
             return getattr(import_module('.io.datasets', __name__), name)
     raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
+
+
+def __dir__() -> list[str]:
+    """Return what there is, with what is loaded when it is asked for: help and completion ask."""
+    return sorted({*globals(), *__getattr__('__all__')})

@@ -1,5 +1,7 @@
 """The public interface, which is that of the package: `from sgor_ros import register`."""
 from .core.common.settings import InputError
+from .core.compact_scan import compact
+from .core.compact_scan import CompactScan
 from .core.config import SgorConfig
 from .core.prepared_scan import PreparedScan
 from .core.preprocessing import preprocess
@@ -15,6 +17,7 @@ from .tracker import TrackedScan
 from .tracker import Tracker
 from .tracker import TrackerConfig
 
-__all__ = ['InputError', 'Placement', 'PreparedScan', 'Registration', 'SemanticScan', 'SgorConfig',
-           'State', 'Status', 'TrackedScan', 'Tracker', 'TrackerConfig', 'preprocess', 'register',
-           'register_correspondences', 'warm_up']
+__all__ = ['CompactScan', 'InputError', 'Placement', 'PreparedScan', 'Registration',
+           'SemanticScan', 'SgorConfig', 'State', 'Status', 'TrackedScan', 'Tracker',
+           'TrackerConfig', 'compact', 'preprocess', 'register', 'register_correspondences',
+           'warm_up']

@@ -13,6 +13,19 @@ from sgor_ros.world import simulate
 PERIOD_NS = 100_000_000
 
 
+SLOW_ROOMS = {'commands', 'evaluation', 'node', 'package', 'world'}
+"""Processes, DDS, drives and tables: `make test-fast` leaves them out."""
+SLOW_FIXTURES = {'data_folder', 'domain'}
+
+
+def pytest_collection_modifyitems(items):
+    """Mark what takes long by the room it is in or by what it asks for; others mark themselves."""
+    for item in items:
+        rooms = item.path.relative_to(Path(__file__).parent).parts
+        if SLOW_ROOMS.intersection(rooms) or SLOW_FIXTURES.intersection(item.fixturenames):
+            item.add_marker('slow')
+
+
 @pytest.fixture(scope='session')
 def data_folder():
     """Return the folder of real data: SGOR_DATA, or ../shared/data beside the checkout."""

@@ -5,4 +5,3 @@ rooms, each above those that it uses: `common`, `execution`, `scan`, `features`,
 `matching`, `scoring`, `solver` (the paper's Sec. III), `icp`, `degeneracy`, `hypotheses`,
 `verdict`.
 """
-from .execution import threads as threads  # first: it says where numba keeps its code

@@ -23,8 +23,8 @@ class PreparedScan:
 
     Attributes
     ----------
-    scan : SemanticScan
-        What it was made from.
+    scan : SemanticScan or None
+        What it was made from; None where it is restored from a `CompactScan`.
     config : SgorConfig
         What it was made with, but for the scale.
     scale : float
@@ -45,7 +45,7 @@ class PreparedScan:
         Keypoints and descriptors of the caller.
     """
 
-    scan: SemanticScan
+    scan: SemanticScan | None
     config: SgorConfig
     scale: float
     features: Features
@@ -79,13 +79,25 @@ class PreparedScan:
                 raise InputError(f'{name}: prepared with {item} = {mine!r}, not with {asked!r}; '
                                  'preprocess it with the configuration of the registration')
 
+    def raw(self, why: str) -> SemanticScan:
+        """Return the scan, which is to be prepared again.
+
+        Raises
+        ------
+        InputError
+            It is restored from a compact one, without its points; with the reason `why`.
+        """
+        if self.scan is None:
+            raise InputError(f'scan: {why}, and a compact scan has no points to prepare again')
+        return self.scan
+
     @property
     def surface(self) -> Surface | None:
         """Cloud for the local refinement; None where there are too few points."""
         return self.surfaced()
 
     def __repr__(self) -> str:
-        return (f'PreparedScan({self.scan}, {len(self.features.points)} keypoints, '
+        return (f'PreparedScan({self.scan or "compact"}, {len(self.features.points)} keypoints, '
                 f'scale {self.scale:g})')
 
 

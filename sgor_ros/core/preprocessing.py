@@ -38,6 +38,7 @@ from .scan.labels import LabelConvention
 from .scan.point_filter import usable_points
 from .scan.scale import scale_of
 from .scan.scale import STREET_VOXEL
+from .scan.scan import rounding_warning
 from .scan.scan import SemanticScan
 from .scan.voxels import shift_of
 from .scan.voxels import thin
@@ -83,10 +84,17 @@ def preprocess(scan: SemanticScan | ArrayLike, config: SgorConfig | None = None,
 
 
 def at_scale(prepared: PreparedScan, scale: float) -> PreparedScan:
-    """Prepare a scan again where its scale is another."""
+    """Prepare a scan again where its scale is another.
+
+    Raises
+    ------
+    InputError
+        It is restored from a compact one, without its points.
+    """
     if prepared.scale == scale:
         return prepared
-    again = _prepare(prepared.scan, prepared.config.replace(scale=scale), prepared.given, None)
+    again = _prepare(prepared.raw('its scale is another'), prepared.config.replace(scale=scale),
+                     prepared.given, None)
     return replace(again, config=prepared.config)
 
 
@@ -97,6 +105,8 @@ def _prepare(scan: SemanticScan, asked: SgorConfig, given: Given | None,
     scale = asked.scale or 1.0
     config, points, labels, warnings, cloud, ranges = _gridded(scan, convention, asked, scale,
                                                                 clock)
+    if rounded := rounding_warning(scan):
+        warnings.append(rounded)
     if asked.scale == 0:
         with clock('voxel grid'):
             even = cloud if config.voxel_size == STREET_VOXEL else voxel_grid(
@@ -112,7 +122,7 @@ def _prepare(scan: SemanticScan, asked: SgorConfig, given: Given | None,
                                                         clock)
     if given is None:
         features = Features(cloud.points, cloud.labels, regional, partial(
-            _described, cloud.points, directions, config.descriptor_radius))
+            fpfh_descriptors, cloud.points, directions, config.descriptor_radius))
     else:
         features = _given(*given, cloud, regional, config)
         directions = normals(features.points, radius_neighbours(
@@ -185,8 +195,9 @@ def _unmatched_classes(convention: LabelConvention, config: SgorConfig) -> list[
     return sorted(ground if config.moving_vote else ground | convention.movable)
 
 
-def _described(points: NDArray[np.float64], directions: NDArray[np.float64], radius: float
-               ) -> NDArray[np.float32]:
+def fpfh_descriptors(points: NDArray[np.float64], directions: NDArray[np.float64], radius: float
+                     ) -> NDArray[np.float32]:
+    """Return the FPFH of (V, 3) keypoints with unit normals, within a radius, metres: (V, 33)."""
     return fpfh(points, directions, radius_neighbours(points, radius))
 
 

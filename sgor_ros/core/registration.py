@@ -215,7 +215,7 @@ def _hints(result: Registration, source: PreparedScan, target: PreparedScan,
     hints = [scale_hint(result, config)]
     if not result.success:
         hints += [f'{side}: {hint}' for side, scan in (('source', source), ('target', target))
-                  if (hint := frame_hint(scan.scan.points, config))]
+                  if scan.scan and (hint := frame_hint(scan.scan.points, config))]
     return tuple(filter(None, hints))
 
 

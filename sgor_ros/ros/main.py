@@ -8,6 +8,7 @@ import os
 import sys
 from typing import TYPE_CHECKING
 
+from ..core.execution.cache import choose_cache_folder
 from . import signals
 
 if TYPE_CHECKING:
@@ -38,6 +39,7 @@ def main(args: list[str] | None = None) -> int:
     if asked := _asked(sys.argv[1:] if args is None else args):
         print(asked)
         return 0
+    choose_cache_folder()
     # late: this takes a second, in which signals must do already
     try:
         import rclpy

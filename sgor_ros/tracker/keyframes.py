@@ -45,7 +45,8 @@ class Keyframe:
         """Return it prepared with these settings: they may have changed since."""
         if prepares_alike(self.prepared.config, config):
             return self
-        return replace(self, prepared=preprocess(self.prepared.scan, config))
+        scan = self.prepared.raw('the settings have changed')
+        return replace(self, prepared=preprocess(scan, config))
 
     def distance(self, other: 'Keyframe') -> float:
         """Return the metres to another; infinite where it is in another frame."""

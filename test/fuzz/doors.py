@@ -13,9 +13,11 @@ import seeds
 from sgor_ros.commands.options import configured
 from sgor_ros.commands.options import read_parameters
 from sgor_ros.core.config import SgorConfig
+from sgor_ros.core.registration import register
 from sgor_ros.core.scan.labels import label_convention
 from sgor_ros.io.bags import BagReader
 from sgor_ros.io.broken import readable
+from sgor_ros.io.compact_scans import read_compact_scan
 from sgor_ros.io.label_field import label_field_of
 from sgor_ros.io.pointcloud2 import decode
 from sgor_ros.io.scans import read_labels
@@ -90,6 +92,11 @@ def _label_table(path):
     assert len(unknown) <= len(ids)
 
 
+def _compact_scan(path):
+    restored = read_compact_scan(path).restored()
+    register(restored, restored)
+
+
 def _parameters(path):
     with redirect_stderr(io.StringIO()):
         arguments = Namespace(params_file=path)
@@ -121,8 +128,12 @@ DOORS = {
     'label': Door('a.label', seeds.labels, _label_file),
     'npz': Door('a.npz', seeds.npzs, lambda path: _scan(read_scan(path)),
                 partial(seeds.made_npz, mutated)),
+    'compact_scan': Door('a.npz', seeds.compact_scans, _compact_scan,
+                         partial(seeds.made_compact_scan, mutated)),
     'pcd': Door('a.pcd', seeds.pcds, lambda path: _scan(read_scan(path))),
     'ply': Door('a.ply', seeds.plys, lambda path: _scan(read_scan(path))),
+    'label_toml': Door('a.toml', seeds.label_tomls, _label_table),
+    'label_json': Door('a.json', seeds.label_jsons, _label_table),
     'label_yaml': Door('a.yaml', seeds.label_yamls, _label_table),
     'parameter_yaml': Door('a.yaml', seeds.parameter_yamls, _parameters),
     'mcap': Door('a.mcap', seeds.mcaps, _bag),

@@ -1,8 +1,10 @@
 """Good inputs, small ones, so that what is spoilt is rarely a mere coordinate."""
 from functools import cache
 import io
+import json
 from pathlib import Path
 import tempfile
+import tomllib
 import zipfile
 
 import numpy as np
@@ -13,7 +15,13 @@ from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import get_typestore
 from rosbags.typesys import Stores
+import yaml
 
+from sgor_ros.core.compact_scan import compact
+from sgor_ros.core.preprocessing import preprocess
+from sgor_ros.core.scan.labels import TABLES
+from sgor_ros.core.scan.scan import SemanticScan
+from sgor_ros.io.compact_scans import write_compact_scan
 from sgor_ros.io.messages import point_cloud2
 
 CLOUD = 'sensor_msgs/msg/PointCloud2'
@@ -136,8 +144,43 @@ def plys():
             header.format('binary_big_endian').encode() + packed.astype('>u4').tobytes()]
 
 
+def label_tomls():
+    return [path.read_bytes() for path in sorted(TABLES.glob('*.toml'))]
+
+
 def label_yamls():
-    return [path.read_bytes() for path in sorted((CONFIG / 'labels').glob('*.yaml'))]
+    return [yaml.safe_dump(_table(text)).encode() for text in label_tomls()]
+
+
+def label_jsons():
+    return [json.dumps(_table(text)).encode() for text in label_tomls()]
+
+
+def _table(text):
+    return tomllib.loads(text.decode())
+
+
+def made_compact_scan(mutate, rng):
+    """Return an archive that is whole, of arrays that are not."""
+    good, file = compact_scans()[0], io.BytesIO()
+    with zipfile.ZipFile(io.BytesIO(good)) as whole, zipfile.ZipFile(file, 'w') as archive:
+        spoilt = rng.choice(whole.namelist())
+        for name in whole.namelist():
+            content = whole.read(name)
+            archive.writestr(name, mutate(content, [content], rng) if name == spoilt else content)
+    return file.getvalue()
+
+
+@cache
+def compact_scans():
+    rng = np.random.default_rng(0)
+    points = rng.uniform(-20, 20, (3000, 3))
+    points[:1500, 2] = -2.0
+    labels = np.repeat([40, 50], 1500)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / 'a.npz'
+        write_compact_scan(path, compact(preprocess(SemanticScan(points, labels))))
+        return [path.read_bytes()]
 
 
 def parameter_yamls():

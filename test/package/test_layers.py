@@ -17,7 +17,6 @@ FILES = {'rosbags', 'rerun', 'matplotlib', 'tqdm', 'argparse'}
 
 # module or folder -> what it may import of the package besides itself
 MAY_IMPORT = {
-    'cache': set(),
     'core': set(),
     'tracker': {'core'},
     'api': {'core', 'tracker'},
@@ -33,7 +32,7 @@ MAY_IMPORT = {
 # rooms and files of core, each above those that it may import
 CORE = ('common', 'execution', 'ablation', 'config', 'scan', 'features', 'index', 'matching',
         'scoring', 'solver', 'icp', 'degeneracy', 'hypotheses', 'prepared_scan', 'preprocessing',
-        'verdict', 'registration', 'prediction_check', 'warmup')
+        'compact_scan', 'verdict', 'registration', 'prediction_check', 'warmup')
 
 # likewise in evaluation
 EVALUATION = ('dense_reference', 'output', 'metrics', 'methods', 'protocols', 'front_end', 'job',

@@ -80,6 +80,7 @@ def test_what_errs_alike_adds_up():
     assert np.sqrt(apart.pose[0, 0]) == pytest.approx(0.01 * np.sqrt(10))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('speed', [1.5, 8.0])
 @pytest.mark.parametrize('mode', ['consecutive', 'keyframe'])
 def test_errors_are_as_large_as_is_claimed(mode, speed):
@@ -120,3 +121,43 @@ def test_nees_of_right_covariances_is_six():
         assert np.mean(found) == pytest.approx(expected, rel=0.06)
         if factor == 1.0:
             assert np.mean(np.array(found) < NEES_BOUND) == pytest.approx(0.997, abs=0.003)
+
+
+def test_a_step_by_hand():
+    """Turned by 90 degrees the step's x is y; 2 m ahead a turn of the reference moves it."""
+    pose = np.diag([1e-4, 2e-4, 3e-4, 1e-6, 2e-6, 3e-6])
+    before = PoseCovariance(pose, np.zeros((6, 6)))
+    T = step(5.0, 6.0, 7.0, 0.0, 0.0, np.pi / 2)
+    found = before.then(T, step(2.0, 0, 0, 0, 0, 0), np.diag([4e-4, 5e-4, 6e-4, 4e-6, 5e-6, 6e-6]),
+                        None)
+    # the lever is (0, 2, 0): about x it moves z, about z it moves x the other way
+    expected = np.diag([1e-4 + 4 * 3e-6 + 5e-4, 2e-4 + 4e-4, 3e-4 + 4 * 1e-6 + 6e-4,
+                        1e-6 + 5e-6, 2e-6 + 4e-6, 3e-6 + 6e-6])
+    expected[0, 5] = expected[5, 0] = -2 * 3e-6
+    expected[2, 3] = expected[3, 2] = 2 * 1e-6
+    np.testing.assert_allclose(found.pose, expected, atol=1e-15)
+    np.testing.assert_array_equal(found.pose, found.pose.T)
+    np.testing.assert_array_equal(found.shared, 0.0)
+
+
+def test_what_is_shared_with_the_errors_to_come_by_hand():
+    """It decays along the way, over 50 m in translation and 2 m in rotation."""
+    rng = np.random.default_rng(0)
+    shared, root = rng.normal(size=(2, 6, 6)) * 1e-2
+    before = PoseCovariance(np.zeros((6, 6)), shared)
+    T = step(0, 0, 0, 0, 0, np.pi / 2)
+    found = before.then(T, step(0, -3.0, 4.0, 0, 0, 0), root @ root.T, root)    # 5 m
+    turn = np.kron(np.eye(2), T[:3, :3])
+    carry = np.eye(6)
+    x, y, z = T[:3, :3] @ [0, -3.0, 4.0]
+    carry[:3, 3:] = [[0, z, -y], [-z, 0, x], [y, -x, 0]]
+    left = carry @ shared * np.exp([-0.1] * 3 + [-2.5] * 3)
+    np.testing.assert_allclose(found.shared, left + turn @ root, atol=1e-15)
+    both = left + turn @ root
+    np.testing.assert_allclose(found.pose, both @ both.T - left @ left.T, atol=1e-15)
+
+
+def test_a_track_begins_without_doubt():
+    origin = PoseCovariance.origin()
+    np.testing.assert_array_equal(origin.pose, np.zeros((6, 6)))
+    np.testing.assert_array_equal(origin.shared, np.zeros((6, 6)))

@@ -9,7 +9,7 @@ from .settings import InputError
 
 
 def as_points(points: ArrayLike, name: str, dtype: Any = np.float64) -> NDArray[Any]:
-    """Return (N, 3) numbers of a type, or say what is wrong with `name`.
+    """Return (N, 3) numbers of a type, their own for None, or say what is wrong with `name`.
 
     Raises
     ------
@@ -19,7 +19,7 @@ def as_points(points: ArrayLike, name: str, dtype: Any = np.float64) -> NDArray[
     if array.ndim != 2 or array.shape[1] != 3:
         raise InputError(f'{name}: expected an (N, 3) array, got shape {array.shape}')
     with np.errstate(over='ignore'):    # what is too large becomes infinite, so it is dropped
-        return array.astype(dtype, copy=False)
+        return array if dtype is None else array.astype(dtype, copy=False)
 
 
 def as_numbers(values: ArrayLike, name: str) -> NDArray[Any]:

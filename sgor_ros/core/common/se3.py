@@ -3,6 +3,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from .products import times_transposed
+
 Array = NDArray[np.float64]
 
 NEARLY_HALF = -0.99
@@ -11,7 +13,7 @@ NEARLY_HALF = -0.99
 
 def transform(T_target_source: Array, points: Array) -> Array:
     """Move (N, 3) points of the source into the target."""
-    return points @ T_target_source[:3, :3].T + T_target_source[:3, 3]
+    return times_transposed(points, T_target_source[:3, :3]) + T_target_source[:3, 3]
 
 
 def inverse(T_target_source: Array) -> Array:

@@ -7,6 +7,8 @@ a weak direction is tried by the perturbation test.
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.products import scatter
+from ..common.products import times_transposed
 from ..icp.point_to_plane import partners
 from ..index.scan_index import ScanIndex
 
@@ -34,11 +36,11 @@ def information(source: ScanIndex, target: ScanIndex, T_target_source: NDArray[n
     rows, at = partners(source, target, T_target_source, KEYPOINTS)
     if not len(rows):
         return np.zeros((6, 6)), 1.0
-    arms = source.points[rows] @ T_target_source[:3, :3].T
+    arms = times_transposed(source.points[rows], T_target_source[:3, :3])
     lever = float(np.sqrt((arms**2).sum(axis=1).mean()))
     normals = target.normals[at]
     jacobian = np.hstack((normals, np.cross(arms, normals) / lever))
-    matrix = jacobian.T @ jacobian / len(rows)
+    matrix = scatter(jacobian) / len(rows)
     if source.level and target.level:
         x, y, up = target.axes
         for direction in (np.r_[up, 0, 0, 0], np.r_[0, 0, 0, x], np.r_[0, 0, 0, y]):

@@ -1,1 +1,1 @@
-"""How compiled code runs: threads, lazy values, compiling, SIMD, stopwatch."""
+"""How compiled code runs: threads, lazy values, compiling and its cache, stopwatch."""

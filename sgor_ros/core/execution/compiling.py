@@ -16,9 +16,16 @@ class NotCompiledError(Exception):
     """A kernel is not in the cache."""
 
 
+@cache
+def listen() -> None:
+    """Hear of each kernel that is compiled from now on; whoever runs kernels calls it first."""
+    event.register('numba:compile', _Watch())  # type: ignore[no-untyped-call]
+
+
 @contextmanager
 def loading_only() -> Iterator[None]:
     """Raise `NotCompiledError` where this thread would compile a kernel, rather than do it."""
+    listen()
     _thread.loads_only = True
     try:
         yield
@@ -45,6 +52,3 @@ class _Watch(event.Listener):
 
     def on_end(self, event: event.Event) -> None:
         pass
-
-
-event.register('numba:compile', _Watch())  # type: ignore[no-untyped-call]

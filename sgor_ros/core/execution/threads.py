@@ -12,21 +12,10 @@ import os
 import threading
 from typing import Any
 
-import numba
-from threadpoolctl import ThreadpoolController
-
-from . import compiling as compiling  # listens from now on
+from .compiling import listen
 
 PIECES = 8
 """Pieces of the work for each thread: the last one to end leaves the others idle."""
-
-# its names are made as it is loaded, unseen by type checkers
-_config: Any = numba.config
-# where the package has chosen a folder after numba was loaded by somebody else
-_config.CACHE_DIR = _config.CACHE_DIR or os.environ.get('NUMBA_CACHE_DIR', '')
-
-# of numpy, which numba has loaded by now
-_blas = ThreadpoolController().select(user_api='blas')
 
 _CORES = len(os.sched_getaffinity(0)) if hasattr(os, 'sched_getaffinity') else os.cpu_count() or 1
 _allowed = threading.local()
@@ -37,17 +26,16 @@ os.register_at_fork(after_in_child=_pool.clear)
 
 @contextmanager
 def cores(count: int) -> Iterator[None]:
-    """Let the compiled loops of this thread use up to `count` cores, and BLAS one.
+    """Let the compiled loops of this thread use up to `count` cores.
 
-    Our matrices are small, and threads of BLAS spin for tens of milliseconds after each product:
-    on two cores that doubled the CPU time of a scan. BLAS has one setting for the whole process:
-    where several threads are in here at once, the last to leave may leave it at one.
+    BLAS is left alone: its limit is one for the whole process, which is not ours. What is
+    large enough to wake its threads goes through `core.common.products` instead.
     """
+    listen()
     before = getattr(_allowed, 'count', _CORES)
     _allowed.count = min(count, _CORES)
     try:
-        with _blas.limit(limits=1):
-            yield
+        yield
     finally:
         _allowed.count = before
 

@@ -10,6 +10,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.products import times_transposed
 from ..config import SgorConfig
 from ..execution.threads import parallel_for
 from ..scan.ground import Ground
@@ -52,7 +53,7 @@ def semantic_context(points: NDArray[np.float64], labels: NDArray[np.uint8], gro
     cell = config.context_scale / 1.5
     across = np.linalg.svd(ground.normal[None])[2][1:]    # two axes in the ground plane
     reach = math.ceil(TRUNCATE * config.context_scale * 2**(OCTAVES - 1) / cell)
-    xy = np.floor(points @ across.T / cell).astype(np.int64)
+    xy = np.floor(times_transposed(points, across) / cell).astype(np.int64)
     xy += reach - xy.min(axis=0, initial=0)
     shape = xy.max(axis=0, initial=0) + reach + 1
     present = [c for c in classes if (labels == c).any()]

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.products import times_transposed
 from ..features.features import Features
 from .birds_eye_view import birds_eye_view
 from .birds_eye_view import BirdsEyeView
@@ -72,5 +73,5 @@ def scan_index(ranges: NDArray[np.float32], features: Features, normals: NDArray
     return ScanIndex(
         features.points, normals, features.regional, max_distance, columns,
         normals[columns.order], features.regional[columns.order], ranges, axes, up is not None,
-        birds_eye_view(features.points @ axes.T, normals @ axes.T, features.regional,
-                       max_distance))
+        birds_eye_view(times_transposed(features.points, axes), times_transposed(normals, axes),
+                       features.regional, max_distance))

@@ -6,6 +6,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.products import scatter
+from ..common.products import times_transposed
+from ..common.products import times_vector
 from ..config import SgorConfig
 from .voxels import VoxelCloud
 
@@ -40,7 +43,7 @@ class Ground:
 
     def heights(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the signed distance of each point over the plane, (N,) metres."""
-        return points @ self.normal + self.offset
+        return times_vector(points, self.normal) + self.offset
 
 
 def segment_ground(cloud: VoxelCloud, ground_classes: frozenset[int],
@@ -75,7 +78,7 @@ def printed_ground(cloud: VoxelCloud, points: NDArray[np.float32], labels: NDArr
     normal, offset = fit_plane(exact[by_label])
     if not config.secondary_ground:
         return Ground(normal, offset, mask, 'labels')
-    near, near_voxels = (np.abs(each @ normal + offset) < config.sigma_g
+    near, near_voxels = (np.abs(times_vector(each, normal) + offset) < config.sigma_g
                          for each in (exact, cloud.points))
     if config.labelled_ground:
         near, near_voxels = near & by_label, near_voxels & mask
@@ -96,7 +99,7 @@ def fit_plane(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
     """
     mean = points.mean(axis=0)
     centred = points - mean
-    normal = np.linalg.svd(centred.T @ centred)[2][-1]
+    normal = np.linalg.svd(scatter(centred))[2][-1]
     offset = -float(normal @ mean)
     return (normal, offset) if offset >= 0 else (-normal, -offset)
 
@@ -133,7 +136,7 @@ def _by_consensus(points: NDArray[np.float64], candidates: NDArray[np.float64],
     flip = offsets < 0
     normals[flip], offsets[flip] = -normals[flip], -offsets[flip]
     sample = candidates[::max(len(candidates) // SAMPLE, 1)]
-    heights = sample @ normals.T + offsets
+    heights = times_transposed(sample, normals) + offsets
     # what lies below a wall or a table plane tells it from the ground
     score = ((np.abs(heights) < config.sigma_g).sum(axis=0)
              - 3 * (heights < -2 * config.sigma_g).sum(axis=0))
@@ -143,12 +146,13 @@ def _by_consensus(points: NDArray[np.float64], candidates: NDArray[np.float64],
         score[~upright] = 0
     best = int(np.argmax(score))
     normal, offset = normals[best], float(offsets[best])
-    near = np.abs(candidates @ normal + offset) < config.sigma_g
+    near = np.abs(times_vector(candidates, normal) + offset) < config.sigma_g
     if score[best] <= 0 or near.sum() < config.min_ground_points:
         return None
     for _ in range(2):
         normal, offset = fit_plane(candidates[near])
-        near = np.abs(candidates @ normal + offset) < config.sigma_g
+        near = np.abs(times_vector(candidates, normal) + offset) < config.sigma_g
         if near.sum() < config.min_ground_points:
             return None
-    return Ground(normal, offset, np.abs(points @ normal + offset) < config.sigma_g, source)
+    return Ground(normal, offset, np.abs(times_vector(points, normal) + offset) < config.sigma_g,
+                  source)

@@ -1,34 +1,32 @@
 """Label conventions: from the ids in a scan to the classes inside (Sec. III-B, S and S_g).
 
-The only files that the core reads are its own label tables under ``config/labels``.
+The only files that the core reads are label tables: its own, in `conventions`, and the user's.
 """
 from dataclasses import dataclass
 from functools import cached_property
 from functools import lru_cache
+import json
 from pathlib import Path
+import tomllib
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-import yaml
 
 from ..common.settings import InputError
 
 UNLABELLED = 0
 """The class inside of everything without a label; it votes for nothing."""
 
+TABLES = Path(__file__).with_name('conventions')
+SUFFIXES = ('.toml', '.json', '.yaml', '.yml')
+"""Of tables; for the last two the package pyyaml is needed."""
 
 
 def labels_agree(a: NDArray[np.uint8], b: NDArray[np.uint8]) -> NDArray[np.bool_]:
     """Return where classes (N,) are the same, as far as both are known."""
     agree: NDArray[np.bool_] = (a == b) | (a == UNLABELLED) | (b == UNLABELLED)
     return agree
-
-
-_HOME = Path(__file__).resolve()
-# beside a checkout's package, or under the prefix that it was installed to
-_TABLES = (_HOME.parents[3] / 'config/labels',
-           *(folder / 'share/sgor_ros/config/labels' for folder in _HOME.parents))
 
 
 @dataclass(frozen=True)
@@ -94,27 +92,41 @@ class LabelConvention:
 
 @lru_cache(maxsize=16)
 def label_convention(name: str) -> LabelConvention:
-    """Return the convention of a name under ``config/labels``, or of a path to a YAML file.
+    """Return the convention of a name in `conventions`, or of a path to a TOML, JSON or YAML file.
 
     Raises
     ------
     InputError
-        No such convention, or a file that is none.
+        No such convention, a file that is none, or YAML without pyyaml.
     """
-    path = Path(name)
-    if path.suffix not in ('.yaml', '.yml'):
-        found = [folder / f'{name}.yaml' for folder in _TABLES if folder.is_dir()]
-        path = next((p for p in found if p.is_file()), path)
-    if not path.is_file():
-        known = sorted(p.stem for folder in _TABLES for p in folder.glob('*.yaml'))
+    known = {path.stem: path for path in sorted(TABLES.glob('*.toml'))}
+    path = known.get(name, Path(name))
+    if path.suffix not in SUFFIXES or not path.is_file():
         raise InputError(f'label_convention = {name!r}: neither a convention '
-                         f'({", ".join(dict.fromkeys(known))}) nor a YAML file')
+                         f'({", ".join(known)}) nor a file ({", ".join(SUFFIXES)})')
     try:
-        return _parse(name, yaml.safe_load(path.read_text()))
-    except (yaml.YAMLError, LookupError, TypeError, ValueError, AttributeError, OverflowError,
+        return _parse(name, _read(path))
+    except ImportError as error:
+        raise InputError(f'label_convention = {name!r}: YAML needs pyyaml ({error}): pip install '
+                         'pyyaml, or write the table as TOML') from error
+    except (LookupError, TypeError, ValueError, AttributeError, OverflowError,
             RecursionError) as error:
         raise InputError(f'label_convention = {name!r}: {path} is not a label convention: '
                          f'{error!r}') from error
+
+
+def _read(path: Path) -> Any:
+    """Return what a file holds; ValueError where it is none of its format."""
+    text = path.read_text()
+    if path.suffix == '.toml':
+        return tomllib.loads(text)
+    if path.suffix == '.json':
+        return json.loads(text)
+    import yaml  # not needed for arrays
+    try:
+        return yaml.safe_load(text)
+    except yaml.YAMLError as error:
+        raise ValueError(str(error)) from error
 
 
 def _parse(name: str, table: dict[str, Any]) -> LabelConvention:

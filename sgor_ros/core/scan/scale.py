@@ -4,6 +4,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.products import scatter
+
 STREET_VOXEL = 0.5
 """Metres: the grid on which sizes compare, whatever the sensor's density."""
 STREET_SIZE = 7.0
@@ -26,7 +28,7 @@ def size_of(points: NDArray[np.float64]) -> float:
         return STREET_SIZE
     points = points[::max(len(points) // SAMPLE, 1)]
     centred = points - points.mean(axis=0)    # a quarter of the time of np.cov
-    variances = np.linalg.eigvalsh(centred.T @ centred / len(points))
+    variances = np.linalg.eigvalsh(scatter(centred) / len(points))
     return math.sqrt(math.sqrt(max(float(variances[1] * variances[2]), 0.0)))
 
 

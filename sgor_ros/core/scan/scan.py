@@ -1,5 +1,6 @@
 """One scan as it comes in: points and labels (`SemanticScan`)."""
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -10,10 +11,15 @@ from ..common.checks import as_points
 from ..common.checks import finite_rows
 from ..common.settings import InputError
 
+ROUNDED = 1e-3
+"""Metres: what is told of rounding to float32, which begins some 10 km from the origin."""
+
 
 @dataclass(frozen=True, eq=False, init=False, repr=False)
 class SemanticScan:
     """One scan: points and, where there are any, their labels.
+
+    Both are copies, so that a caller may fill the same buffer with the next scan.
 
     Parameters
     ----------
@@ -30,18 +36,24 @@ class SemanticScan:
 
     points: NDArray[np.float32]
     labels: NDArray[np.int64] | None
+    rounding: float
+    """How far off half of the points are at least for being kept as float32, metres; 0: little."""
 
     def __init__(self, points: ArrayLike, labels: ArrayLike | None = None) -> None:
-        clean = as_points(points, 'points', np.float32)
-        ids = None if labels is None else as_labels(labels, len(clean), 'labels')
+        exact = as_points(points, 'points', None)
+        with np.errstate(over='ignore'):
+            clean = exact.astype(np.float32, order='C')
+        ids = None if labels is None else as_labels(labels, len(clean), 'labels').copy()
         finite = finite_rows(clean)
         if not finite.any():
             raise InputError(f'points: none of {len(clean)} is finite' if len(clean)
                              else 'points: the scan is empty')
         if not finite.all():
-            clean, ids = clean[finite], None if ids is None else ids[finite]
-        object.__setattr__(self, 'points', np.ascontiguousarray(clean))
+            exact, clean = exact[finite], clean[finite]
+            ids = None if ids is None else ids[finite]
+        object.__setattr__(self, 'points', clean)
         object.__setattr__(self, 'labels', ids)
+        object.__setattr__(self, 'rounding', _rounding(exact, clean))
 
     def __len__(self) -> int:
         return len(self.points)
@@ -49,3 +61,19 @@ class SemanticScan:
     def __repr__(self) -> str:
         labels = '' if self.labels is None else f', {len(np.unique(self.labels))} label ids'
         return f'SemanticScan({len(self)} points{labels})'
+
+
+def _rounding(exact: NDArray[Any], kept: NDArray[np.float32]) -> float:
+    """Return the median error of points, metres, where it may be more than `ROUNDED`."""
+    largest = max(float(kept.max()), -float(kept.min()))
+    if exact.dtype == np.float32 or np.spacing(np.float32(largest)) < ROUNDED:
+        return 0.0
+    return float(np.median(np.abs(exact - kept.astype(np.float64)).max(axis=1)))
+
+
+def rounding_warning(scan: SemanticScan) -> str:
+    """Say that the coordinates are too large to be kept well; empty: they are not."""
+    if scan.rounding <= ROUNDED:
+        return ''
+    return (f'points: rounded to float32 as they are kept, half of them by {scan.rounding:.2g} m '
+            'and more: subtract the position of the sensor first, as in the frame of the sensor')

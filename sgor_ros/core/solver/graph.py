@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..config import SgorConfig
-from ..execution.simd import count
 from ..execution.threads import parallel_for
 from ..matching.correspondences import Correspondences
 from ..scan.voxels import thin
-from .lengths import lanes_of
+from .lengths import columns_of
+from .lengths import count_bits
 from .lengths import mark_row
 from .lengths import places_of_bits
 from .lengths import prefilter_limit
@@ -145,7 +145,7 @@ def _upper(p: NDArray[np.float64], q: NDArray[np.float64], nodes: int, sigma_d: 
         How many i < j of each j are in each band.
     """
     n = len(p)
-    columns = lanes_of(p - p.mean(axis=0), q - q.mean(axis=0))
+    columns = columns_of(p - p.mean(axis=0), q - q.mean(axis=0))
     if nodes < n:
         others = np.ones(n, np.bool_)
         others[thin(n, nodes)] = False
@@ -176,15 +176,16 @@ def _upper(p: NDArray[np.float64], q: NDArray[np.float64], nodes: int, sigma_d: 
 def _mark(first, columns, limit, bits):
     """Set bit j of the rows from `first` on for each candidate pair i <= j; return how many."""
     found = U64(0)
+    near = np.empty(columns.shape[1], np.uint8)
     for r in range(len(bits)):
         i = first + r
         px, py, pz, qx, qy, qz = columns[:, i]
         row = bits[r]
         w = U64(i) // U64(64)
-        mark_row(columns, w, px, py, pz, qx, qy, qz, limit, row)
+        mark_row(columns, w, px, py, pz, qx, qy, qz, limit, near, row)
         row[w] &= ~U64(0) << (U64(i) % U64(64))
         for k in range(w, U64(len(row))):
-            found += count(row[k])
+            found += count_bits(row[k])
     return found
 
 

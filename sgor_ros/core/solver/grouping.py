@@ -1,5 +1,6 @@
 """Correspondence grouping: keys by spectral matching, kNN groups (Sec. III-B)."""
 from dataclasses import dataclass
+import math
 
 import numba
 import numpy as np
@@ -66,7 +67,8 @@ def leading_eigenvector(graph: ConsistencyGraph) -> NDArray[np.float32]:
     for _ in range(POWER_ITERATIONS):
         parallel_for(_multiply, len(vector), graph.start, graph.index, graph.weight, vector,
                      product)
-        vector, product = product / np.linalg.norm(product), vector
+        vector, product = product / math.sqrt(
+            np.einsum('i,i', product, product, dtype=np.float64)), vector
     return vector
 
 

@@ -5,11 +5,6 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from ..execution.simd import at_most
-from ..execution.simd import load
-from ..execution.simd import lowest
-from ..execution.simd import splat
-
 PREFILTER_SLACK = 1e-3
 """Metres: float32 finds the candidate pairs, float64 decides. In a scan of 100 m the former errs
 by some 1e-5."""
@@ -20,7 +15,7 @@ U64 = np.uint64
 _ONE = U64(1)
 
 
-def lanes_of(p: NDArray[np.float64], q: NDArray[np.float64]) -> NDArray[np.float32]:
+def columns_of(p: NDArray[np.float64], q: NDArray[np.float64]) -> NDArray[np.float32]:
     """Return (N, 3) and (N, 3) as six rows of whole words of 64, filled up with NaN."""
     columns = np.full((6, -(-len(p) // 64) * 64), np.nan, np.float32)
     columns[:3, :len(p)], columns[3:, :len(p)] = p.T, q.T
@@ -36,23 +31,39 @@ def prefilter_limit(reach: float) -> np.float32:
     return np.float32(2 * (reach + PREFILTER_SLACK)**2)
 
 
-@numba.njit(cache=True, nogil=True)
-def mark_row(columns, from_word, px, py, pz, qx, qy, qz, limit, row):
-    """Set bit j of a row where the lengths to j may differ by the reach, from a word on."""
+@numba.njit(cache=True, nogil=True, fastmath={'contract', 'nsz'})
+def mark_row(columns, from_word, px, py, pz, qx, qy, qz, limit, near, row):
+    """Set bit j of a row where the lengths to j may differ by the reach, from a word on.
+
+    `near`, a byte for each j, is written on the way: each of the two loops becomes vector code,
+    which one loop would not.
+    """
     ax, ay, az = columns[0], columns[1], columns[2]
     bx, by, bz = columns[3], columns[4], columns[5]
-    px, py, pz = splat(px), splat(py), splat(pz)
-    qx, qy, qz = splat(qx), splat(qy), splat(qz)
-    most = splat(limit)
-    parts = row.view(np.uint16)
-    for part in range(U64(4) * U64(from_word), U64(len(parts))):
-        j = U64(16) * part
-        x, y, z = load(ax, j) - px, load(ay, j) - py, load(az, j) - pz
+    for j in range(U64(64) * U64(from_word), U64(columns.shape[1])):
+        x, y, z = ax[j] - px, ay[j] - py, az[j] - pz
         p = x * x + y * y + z * z
-        x, y, z = load(bx, j) - qx, load(by, j) - qy, load(bz, j) - qz
+        x, y, z = bx[j] - qx, by[j] - qy, bz[j] - qz
         q = x * x + y * y + z * z
         gap = p - q
-        parts[part] = at_most(gap * gap, most * (p + q))
+        near[j] = gap * gap <= limit * (p + q)
+    eights = near.view(np.uint64)
+    for w in range(U64(from_word), U64(len(row))):
+        word = U64(0)
+        for k in range(U64(8)):
+            # the lowest bits of eight bytes, side by side
+            eight = (eights[U64(8) * w + k] * U64(0x0102040810204080)) >> U64(56)
+            word |= eight << (U64(8) * k)
+        row[w] = word
+
+
+@numba.njit(cache=True, nogil=True, inline='always')
+def count_bits(word):
+    """Return how many bits of a uint64 are set."""
+    word = word - ((word >> U64(1)) & U64(0x5555555555555555))
+    word = (word & U64(0x3333333333333333)) + ((word >> U64(2)) & U64(0x3333333333333333))
+    word = (word + (word >> U64(4))) & U64(0x0F0F0F0F0F0F0F0F)
+    return (word * U64(0x0101010101010101)) >> U64(56)
 
 
 @numba.njit(cache=True, nogil=True)
@@ -62,7 +73,8 @@ def places_of_bits(row, from_word, places):
     for w in range(U64(from_word), U64(len(row))):
         word = row[w]
         while word:
-            places[found] = U64(64) * w + lowest(word)
+            # below the lowest bit that is set all are, once one is taken away
+            places[found] = U64(64) * w + count_bits((word & (~word + _ONE)) - _ONE)
             found += _ONE
             word &= word - _ONE
     return found

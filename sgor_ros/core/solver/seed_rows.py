@@ -1,8 +1,8 @@
 """Seed rows of M* (Eq. 7): entry (l, j) is m_l^T W_m m_j, the rows of M' as vectors of 0 and 1.
 
 Keys are worked on in blocks of 64, one bit of a word each: first the support, m_l^T W_m for all
-keys of the block at once, each column of it one pass over a row of W_m that stays in registers;
-then, for each key, its sum over the ones of each m_j that the key may keep.
+keys of the block at once, each column of it one pass over a row of W_m; then, for each key, its
+sum over the ones of each m_j that the key may keep.
 """
 from collections.abc import Iterator
 from typing import NamedTuple
@@ -11,17 +11,12 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from ..execution.simd import add_where
-from ..execution.simd import load
-from ..execution.simd import splat
-from ..execution.simd import store
-from ..execution.simd import total
 from ..execution.threads import parallel_for
 from ..matching.correspondences import Correspondences
 from .graph import ConsistencyGraph
 from .graph import pairs_within
 from .graph import Rows
-from .lengths import lanes_of
+from .lengths import columns_of
 from .lengths import mark_row
 from .lengths import places_of_bits
 from .lengths import prefilter_limit
@@ -29,9 +24,9 @@ from .lengths import U64
 from .lengths import weigh
 
 BLOCK = 64
-"""Keys of which each has a bit of a word, and a lane of four vectors."""
-SPARSE = 3
-"""Single additions that take as long as one to 64 lanes."""
+"""Keys of which each has a bit of a word."""
+SPARSE = 6
+"""Single additions that take as long as one to the sums of all 64 keys."""
 FEW_BLOCKS, MOST_MATCHES = 4, 12_000
 """With more blocks W_m beyond sigma_d is weighed once; of more matches it would be too large."""
 
@@ -91,23 +86,22 @@ def add_support(correspondences: Correspondences, graph: ConsistencyGraph, far: 
         both = np.hstack((p - p.mean(axis=0), q - q.mean(axis=0)))
         some = np.flatnonzero(near)
         parallel_for(_support_afar, tasks, graph.start, graph.index, both, both[some],
-                     lanes_of(both[some, :3], both[some, 3:]), prefilter_limit(graph.reach),
-                     graph.sigma_d, graph.reach, near[some], block.wanted, support)
+                     columns_of(both[some, :3], both[some, 3:]), prefilter_limit(graph.reach),
+                     graph.sigma_d, graph.reach, near[some], _spread(near[some]), block.wanted,
+                     support)
     elif block.visits < SPARSE * len(graph.index):
         parallel_for(_scatter, len(keys), graph.start, graph.index, far.start, far.index,
                      far.weight, keys, support)
     else:
-        parallel_for(_support, tasks, far.start, far.index, far.weight, near.view(np.uint16),
+        parallel_for(_support, tasks, far.start, far.index, far.weight, _spread(near),
                      support)
 
 
 def choose(graph: ConsistencyGraph, block: Block, support: NDArray[np.float32],
            places: NDArray[np.intp], kept: NDArray[np.int64], scores: NDArray[np.float32]) -> None:
     """Sum the support of each key over the ones of what it may keep; leave the best in its row."""
-    bits = np.zeros((len(block.rows) + 1, support.shape[1] // 64), np.uint64)
-    parallel_for(_mark_rows, len(block.rows), graph.start, graph.index, block.rows, bits)
-    parallel_for(_choose, len(places), support, block.rows, block.wanted[block.rows],
-                 bits.view(np.uint16), places, kept, scores)
+    parallel_for(_choose, len(places), graph.start, graph.index, support, block.rows,
+                 block.wanted[block.rows], places, kept, scores)
 
 
 @numba.njit(cache=True, nogil=True)
@@ -133,23 +127,24 @@ def _scatter(first, last, start, index, far_start, far_index, weight,
 
 
 @numba.njit(cache=True, nogil=True)
-def _support(first, last, start, index, weight, near, support):
+def _support(first, last, start, index, weight, ones, support):
     """Write sixteen columns a task, from the rows of the graph."""
     n = U64(len(start)) - U64(1)
     square = np.zeros((16, BLOCK), np.float32)
     for part in range(U64(first), U64(last)):
         for b in range(U64(16) * part, min(U64(16) * part + U64(16), n)):
             row = slice(start[b], start[b + U64(1)])
-            _add(near, index[row], weight[row], row.stop - row.start, square[b - U64(16) * part])
+            _add(ones, index[row], weight[row], row.stop - row.start, square[b - U64(16) * part])
         _transpose(square, U64(16) * part, support)
 
 
 @numba.njit(cache=True, nogil=True)
 def _support_afar(first, last, start, index, both, some, columns,
-                  limit, sigma_d, reach, near, wanted, support):
-    """Write sixteen columns a task, from all that is near a key (`some`, and `near` of it)."""
+                  limit, sigma_d, reach, near, ones, wanted, support):
+    """Write sixteen columns a task, from what is near a key: `some`, `near` and its `ones`."""
     square = np.zeros((16, BLOCK), np.float32)
     row = np.empty(columns.shape[1] // 64, np.uint64)
+    flags = np.empty(columns.shape[1], np.uint8)
     places, weights = np.empty(len(some) + 1, np.uint32), np.empty(len(some), np.float32)
     squared, other = np.empty(len(some)), np.empty(len(some))
     for part in range(U64(first), U64(last)):
@@ -158,7 +153,7 @@ def _support_afar(first, last, start, index, both, some, columns,
             if keys:
                 px, py, pz, qx, qy, qz = both[b]
                 mark_row(columns, 0, np.float32(px), np.float32(py), np.float32(pz),
-                         np.float32(qx), np.float32(qy), np.float32(qz), limit, row)
+                         np.float32(qx), np.float32(qy), np.float32(qz), limit, flags, row)
                 found = U64(0)
                 for k in range(places_of_bits(row, 0, places)):
                     j = places[k]
@@ -166,24 +161,35 @@ def _support_afar(first, last, start, index, both, some, columns,
                     found += U64((near[j] & keys) != U64(0))
                 weigh(some, places, found, px, py, pz, qx, qy, qz, sigma_d, reach, squared, other,
                       weights)
-                _add(near.view(np.uint16), places, weights, found, square[b - U64(16) * part])
+                _add(ones, places, weights, found, square[b - U64(16) * part])
         _transpose(square, U64(16) * part, support)
 
 
 @numba.njit(cache=True, nogil=True)
-def _add(near, places, weights, count, sums):
+def _spread(words):
+    """Return the bits of words as ones and zeros, (N, 64) float32."""
+    ones = np.empty((len(words), BLOCK), np.float32)
+    for i in range(U64(len(words))):
+        for g in range(U64(BLOCK)):
+            ones[i, g] = np.float32((words[i] >> g) & U64(1))
+    return ones
+
+
+@numba.njit(cache=True, nogil=True, fastmath={'contract', 'nsz'})
+def _add(ones, places, weights, count, sums):
     """Write the sum of the weights at places for each key that these are near."""
-    one = two = three = four = splat(np.float32(0.0))
-    for k in range(U64(count)):
-        at, w = U64(4) * U64(places[k]), splat(weights[k])
-        one = add_where(near[at], one, w)
-        two = add_where(near[at + U64(1)], two, w)
-        three = add_where(near[at + U64(2)], three, w)
-        four = add_where(near[at + U64(3)], four, w)
-    store(sums, U64(0), one)
-    store(sums, U64(16), two)
-    store(sums, U64(32), three)
-    store(sums, U64(48), four)
+    sums[:] = 0
+    twos = U64(count) & ~U64(1)
+    for k in range(U64(0), twos, U64(2)):
+        # two at once: half as often to memory and back
+        near, other = ones[U64(places[k])], ones[U64(places[k + U64(1)])]
+        w, v = weights[k], weights[k + U64(1)]
+        for g in range(U64(BLOCK)):
+            sums[g] = sums[g] + w * near[g] + v * other[g]
+    if twos < U64(count):
+        near, w = ones[U64(places[twos])], weights[twos]
+        for g in range(U64(BLOCK)):
+            sums[g] += w * near[g]
 
 
 @numba.njit(cache=True, nogil=True)
@@ -195,46 +201,29 @@ def _transpose(square, at, support):
 
 
 @numba.njit(cache=True, nogil=True)
-def _mark_rows(first, last, start, index, rows, bits):
-    """Write rows of M' as bits."""
-    for r in range(U64(first), U64(last)):
-        row = bits[r]
-        i = U64(rows[r])
-        for k in range(start[i], start[i + U64(1)]):
-            j = U64(index[k])
-            row[j >> U64(6)] |= U64(1) << (j & U64(63))
-
-
-@numba.njit(cache=True, nogil=True)
-def _choose(first, last, support, rows, wanted, bits, places, kept,
-            scores):
-    own = np.empty(len(rows) + 4, np.uint32)
+def _choose(first, last, start, index, support, rows, wanted, places, kept, scores):
     for g in range(U64(first), U64(last)):
-        found = U64(0)
-        for r in range(U64(len(rows))):
-            own[found] = r
-            found += (wanted[r] >> g) & U64(1)
-        # up to fours, of an empty row
-        own[found:found + U64(3)] = len(rows)
         sums = support[g]
-        for k in range(U64(0), found, U64(4)):
-            a, b, c, d = own[k], own[k + U64(1)], own[k + U64(2)], own[k + U64(3)]
-            ones, twos, threes, fours = bits[a], bits[b], bits[c], bits[d]
-            one = two = three = four = splat(np.float32(0.0))
-            for part in range(U64(len(ones))):
-                lanes = load(sums, U64(16) * part)
-                one = add_where(ones[part], one, lanes)
-                two = add_where(twos[part], two, lanes)
-                three = add_where(threes[part], three, lanes)
-                four = add_where(fours[part], four, lanes)
-            best, items = scores[places[g]], kept[places[g]]
-            _insert(total(one), rows[a], best, items)
-            if k + U64(1) < found:
-                _insert(total(two), rows[b], best, items)
-            if k + U64(2) < found:
-                _insert(total(three), rows[c], best, items)
-            if k + U64(3) < found:
-                _insert(total(four), rows[d], best, items)
+        best, items = scores[places[g]], kept[places[g]]
+        for r in range(U64(len(rows))):
+            if (wanted[r] >> g) & U64(1):
+                i = U64(rows[r])
+                _insert(_sum(sums, index[start[i]:start[i + U64(1)]]), rows[r], best, items)
+
+
+@numba.njit(cache=True, nogil=True, fastmath={'reassoc', 'nsz'})
+def _sum(values, places):
+    """Return the sum of values at some places, in four sums that do not wait for each other."""
+    a = b = c = d = np.float32(0.0)
+    whole = U64(len(places)) & ~U64(3)
+    for k in range(U64(0), whole, U64(4)):
+        a += values[places[k]]
+        b += values[places[k + U64(1)]]
+        c += values[places[k + U64(2)]]
+        d += values[places[k + U64(3)]]
+    for k in range(whole, U64(len(places))):
+        a += values[places[k]]
+    return (a + b) + (c + d)
 
 
 @numba.njit(cache=True, nogil=True)

@@ -7,6 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.products import times_transposed
 from ..config import SgorConfig
 from .result import Registration
 
@@ -67,7 +68,7 @@ def scale_hint(result: Registration, config: SgorConfig) -> str:
     """
     if result.T_target_source is None or result.confidence < SCALE_CONFIDENCE:
         return ''
-    turned = result.source_points @ result.T_target_source[:3, :3].T
+    turned = times_transposed(result.source_points, result.T_target_source[:3, :3])
     target, agree, factor = result.target_points, result.inliers, 1.0
     for _ in range(SCALE_ROUNDS):
         if agree.sum() < SCALE_MATCHES:

@@ -41,7 +41,7 @@ def corridor(rng: np.random.Generator) -> Place:
         plot.add(BUILDING, turn(niches(begins, begins + width, 0.0, 2.05,
                                        np.full(len(begins), depth), (-_HALF, _HALF), top), y))
     return finish(plot, (-40.0, 40.0, 0.35 - half, half - 0.35), sensor_height=1.0,
-                  clearance=0.3)
+                  clearance=0.3, repeats=(pitch, np.inf))
 
 
 def garage(rng: np.random.Generator, full: float = 0.0) -> Place:
@@ -74,4 +74,5 @@ def garage(rng: np.random.Generator, full: float = 0.0) -> Place:
                     plot.put(car(rng), spot, rng.choice([-1, 1]) * np.pi / 2
                              + rng.normal(0.0, 0.03))
     reach = min(half - 2.0, 45.0)
-    return finish(plot, (-reach, reach, 2.0 - wide, wide - 2.0))
+    return finish(plot, (-reach, reach, 2.0 - wide, wide - 2.0),
+                  repeats=(np.inf if full else bay, np.inf))

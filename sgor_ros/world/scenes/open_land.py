@@ -60,7 +60,8 @@ def orchard(rng: np.random.Generator, *, jittered: bool = False) -> Place:
             elif rng.random() > 0.12:
                 plot.put(pool[int(rng.integers(len(pool)))], (x, y) + rng.normal(0.0, 0.2, 2),
                          rng.uniform(0.0, 2 * np.pi))
-    return finish(plot, (-30.0, 30.0, -25.0, 25.0), clearance=0.3)
+    return finish(plot, (-30.0, 30.0, -25.0, 25.0), clearance=0.3,
+                  repeats=(np.inf, np.inf) if jittered else (pitch, row))
 
 
 def parking(rng: np.random.Generator, *, jittered: bool = False) -> Place:
@@ -83,7 +84,9 @@ def parking(rng: np.random.Generator, *, jittered: bool = False) -> Place:
     for middle in module * (np.arange(-5, 5) + 0.5):
         for x in 10 * _STALL * np.arange(-5, 5) + _STALL / 2:
             plot.put(mast, (x, middle))
-    return finish(plot, (-35.0, 35.0, -30.0, 30.0))
+    # but for a mast each ten stalls
+    return finish(plot, (-35.0, 35.0, -30.0, 30.0),
+                  repeats=(np.inf, np.inf) if jittered else (_STALL, module))
 
 
 def _rock(rng: np.random.Generator) -> Parts:

@@ -36,6 +36,8 @@ class Place(Scene):
         Above the ground, m.
     clearance : float
         Least distance of a sensor to what stands there, m.
+    repeats : (float, float)
+        It is the same again so far on along x and along y, m: 0 anywhere, infinity nowhere.
     """
 
     area: Rectangle
@@ -45,13 +47,15 @@ class Place(Scene):
     ground_height: Callable[[Array], Array]
     sensor_height: float
     clearance: float
+    repeats: tuple[float, float]
 
 
 def finish(plot: Plot, area: Rectangle, *, closed: bool = False, sensor_height: float = 1.7,
-           clearance: float = 0.8) -> Place:
+           clearance: float = 0.8,
+           repeats: tuple[float, float] = (np.inf, np.inf)) -> Place:
     """Close a plot: nothing is built after that; the parameters are those of `Place`."""
     return Place(*close(plot.triangles, {}), area, plot.boxes, plot.path, closed, plot.height,
-                 sensor_height, clearance)
+                 sensor_height, clearance, repeats)
 
 
 def straight(length: float, y: float = 0.0) -> Array:

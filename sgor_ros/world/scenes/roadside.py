@@ -79,7 +79,8 @@ def facade(rng: np.random.Generator, cars: str = 'none') -> Place:
                 plot.put(car(rng), (x, line + rng.uniform(-0.1, 0.1)),
                          rng.choice([0.0, np.pi]) + rng.normal(0.0, 0.03))
             x += rng.uniform(5.6, 7.2)
-    return finish(plot, (-_CORE, _CORE, 2.0, far + 2.0 - 0.9))
+    return finish(plot, (-_CORE, _CORE, 2.0, far + 2.0 - 0.9),
+                  repeats=(np.inf if cars == 'random' else bay, np.inf))
 
 
 def highway(rng: np.random.Generator) -> Place:

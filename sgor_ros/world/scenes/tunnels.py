@@ -46,7 +46,8 @@ def tunnel(rng: np.random.Generator, lamp_pitch: float | None = None) -> Place:
         for side in sides:
             y = side * half * np.sqrt(1 - max(0.0, (high - wall) / (6.6 - wall)) ** 2)
             _lamps(plot, lamp_pitch, y, side, size, high)
-    return finish(plot, (-_CORE, _CORE, kerb - half + 0.6, half - kerb - 0.6))
+    return finish(plot, (-_CORE, _CORE, kerb - half + 0.6, half - kerb - 0.6),
+                  repeats=(lamp_pitch or 0.0, np.inf))
 
 
 def road_tunnel(rng: np.random.Generator) -> Place:

@@ -1,4 +1,7 @@
-"""Compiled code of a package that somebody else installed: read, but never from just anybody."""
+"""Compiled code of a package that somebody else installed: read, but never from just anybody.
+
+By the node and the commands, which call `choose_cache_folder` before anything else.
+"""
 import os
 from pathlib import Path
 import shutil
@@ -9,10 +12,14 @@ import pytest
 
 import sgor_ros
 
+pytestmark = pytest.mark.slow    # processes that compile anew
+
 # of one small kernel: how often it is compiled
 CODE = """
 from numba.core import event
 import numpy as np
+from sgor_ros.core.execution.cache import choose_cache_folder
+choose_cache_folder()
 from sgor_ros.core.solver.verification import near_counts
 compiled = []
 class Listener(event.Listener):

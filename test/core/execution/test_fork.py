@@ -2,6 +2,10 @@
 import subprocess
 import sys
 
+import pytest
+
+pytestmark = pytest.mark.slow    # processes that compile anew
+
 CODE = """
 import multiprocessing
 import numpy as np

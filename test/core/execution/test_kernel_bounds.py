@@ -8,6 +8,8 @@ import pytest
 
 from sgor_ros.core.index.birds_eye_view import birds_eye_view
 
+pytestmark = pytest.mark.slow    # processes that compile anew
+
 SCRIPT = """
 import numpy as np
 

@@ -7,6 +7,8 @@ import time
 
 import pytest
 
+pytestmark = pytest.mark.slow    # processes that compile anew
+
 WORD = 'compiling for this machine'
 WARM_UP = """
 from numba.core import event

@@ -1,266 +1,324 @@
-"""The other placements that explain two scans, and the directions in which they slide."""
-from itertools import pairwise
-
-from conftest import errors
-from conftest import relative
+"""The poses that compete with one, on galleries made by hand: how many, how far, which way."""
+from galleries import gallery
+from galleries import index_of
+from galleries import moved
+from galleries import NOTHING
+from galleries import UP
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from sgor_ros import register
-from sgor_ros import SemanticScan
+from sgor_ros import SgorConfig
 from sgor_ros.core.degeneracy.directions import DegenerateDirection
-from sgor_ros.core.degeneracy.directions import in_words
-from sgor_ros.core.degeneracy.directions import inflated
-from sgor_ros.core.degeneracy.directions import perturbed_poses
-from sgor_ros.core.degeneracy.directions import slid_back
-from sgor_ros.core.degeneracy.localizability import information
-from sgor_ros.core.degeneracy.localizability import weak_directions
-from sgor_ros.core.features.features import Features
+from sgor_ros.core.hypotheses.competing import _candidates
+from sgor_ros.core.hypotheses.competing import _distinct
+from sgor_ros.core.hypotheses.competing import alone
+from sgor_ros.core.hypotheses.competing import compete
 from sgor_ros.core.hypotheses.competing import hypothesis_test
-from sgor_ros.core.hypotheses.map_correlation import correlate_maps
 from sgor_ros.core.icp.point_to_plane import icp
-from sgor_ros.core.index.range_image import range_image
-from sgor_ros.core.index.scan_index import scan_index
-from sgor_ros.core.scoring.comparison import differ
-from sgor_ros.core.scoring.comparison import ruled_out
-from sgor_ros.world import Lidar
-from sgor_ros.world import scenes
+from sgor_ros.core.scoring.pose_scoring import pose_score
+from sgor_ros.core.scoring.pose_scoring import score_keypoints
 
-REACH = 0.6
-UP = np.array([0.0, 0.0, 1.0])
 ALONG_X = np.array([1.0, 0, 0, 0, 0, 0])
-BOUND = 20.06    # of chi2 with 6 degrees of freedom at 99.73 %
-
-
-def moved(x, y=0.0, z=0.0, yaw_deg=0.0):
-    T = np.eye(4)
-    T[:3, :3] = Rotation.from_euler('z', yaw_deg, degrees=True).as_matrix()
-    T[:3, 3] = x, y, z
-    return T
-
-
-def gallery(pitch=8.0, offset=0.0, ends=(-40.0, 40.0)):
-    """Return what is seen between two walls at y = 4 and -4 with a pillar each `pitch` metres.
-
-    Points and unit normals towards the sensor, (V, 3) each.
-    """
-    points, normals = [], []
-    for y in (-4.0, 4.0):
-        wall = np.stack(np.meshgrid(np.arange(*ends, 0.5), [y], np.arange(-1.5, 3, 0.5)), -1)
-        points.append(wall.reshape(-1, 3))
-        normals.append(np.tile([0.0, -np.sign(y), 0.0], (len(points[-1]), 1)))
-    if pitch:
-        for x in np.arange(ends[0] + (offset - ends[0]) % pitch, ends[1], pitch):
-            for dx, facing in ((-0.6, -1.0), (0.6, 1.0)):
-                side = np.stack(np.meshgrid([x + dx], [-3.4, -2.9, -2.4],
-                                            np.arange(-1.5, 3, 0.5)), -1).reshape(-1, 3)
-                points.append(side)
-                normals.append(np.tile([facing, 0.0, 0.0], (len(side), 1)))
-    return np.concatenate(points), np.concatenate(normals)
-
-
-def view_of(points, normals, up=UP):
-    labels = np.zeros(len(points), np.uint8)
-    features = Features(points, labels, labels, np.zeros((len(points), 3), np.float32))
-    # the walls densely, as a sensor sees them
-    steps = np.arange(-0.25, 0.3, 0.1)
-    dense = np.concatenate([points + (i * normals[:, [1, 0, 2]] + [0, 0, j])
-                            for i in steps for j in steps])
-    return scan_index(range_image(dense.astype(np.float32)), features, normals, up, REACH)
+NOT_WEAK = np.empty((0, 6))
 
 
 @pytest.fixture(scope='module')
 def bare():
-    return view_of(*gallery(pitch=0.0))
+    return index_of(*gallery(pitch=0.0))
 
 
 @pytest.fixture(scope='module')
 def pillars():
-    return view_of(*gallery(pitch=8.0))
+    """Return pillars each 8 m on one side: the same again 8 m on, and not turned round."""
+    return index_of(*gallery(pitch=8.0))
 
 
-def test_rivals_are_ruled_out_by_what_they_alone_violate():
-    """Of 1,000 points: 5 more violations and three times those of the answer, or no support."""
-    answer = np.ones(1000, np.int8)
-    answer[:2] = -1
-
-    def rival(violations, violations_of_answer_explained=0, silent=0):
-        said = np.zeros(1000, np.int8)
-        said[2 + violations:1000 - silent] = 1
-        said[2:2 + violations] = -1
-        said[:violations_of_answer_explained] = 1
-        return said
-    asked = np.array([rival(0), rival(4), rival(5), rival(100), rival(5, 1), rival(6, 1),
-                      rival(0, 0, 540), rival(0, 0, 560)])
-    assert ruled_out(answer, asked).tolist() == [False, False, True, True, False, True, False,
-                                                 True]
+@pytest.fixture(scope='module')
+def once():
+    return index_of(*gallery(pitch=200.0, offset=3.0))
 
 
-def test_placements_differ_in_the_plane_of_the_ground(bare):
-    others = np.array([moved(0.5), moved(0.7), moved(0, 0, 2), moved(0, yaw_deg=4),
-                       moved(0, yaw_deg=6)])
-    assert differ(np.eye(4), others, bare).tolist() == [False, True, False, False, True]
-    tumbling = view_of(*gallery(pitch=0.0), up=None)
-    assert differ(np.eye(4), others, tumbling).tolist() == [False, True, True, False, True]
+def tube(up=UP):
+    """Return a square tube, alike under quarter turns about its axis, with steps at three places.
+    """
+    points, normals = [], []
+    across = np.arange(-3.75, 4, 0.5)
+    for quarter in range(4):
+        R = moved(roll_deg=90.0 * quarter)[:3, :3]
+        parts = [(np.arange(-20, 20, 0.5), [-4.0], UP)]
+        parts += [([x], [-3.75, -3.25], [facing, 0, 0])
+                  for x, facing in ((-7.0, 1.0), (2.0, -1.0), (11.0, -1.0))]
+        for x, z, normal in parts:
+            side = np.stack(np.meshgrid(x, across, z), -1).reshape(-1, 3)
+            points.append(side @ R.T)
+            normals.append(np.tile(R @ normal, (len(side), 1)))
+    return index_of(np.concatenate(points), np.concatenate(normals), up=up)
 
 
-def test_the_overhead_maps_correlate_one_pitch_apart(pillars):
-    """Both ways, straight and turned round, though nothing says so but the pillars."""
-    found = correlate_maps(pillars, pillars, np.eye(4), 30.0)
-    straight = found[np.abs(found[:, 0, 0] - 1) < 1e-9]
-    assert np.abs(np.abs(straight[:, 0, 3]) % 8.0).tolist() == pytest.approx(
-        [0.0] * len(straight), abs=8.0)
-    assert (np.abs(straight[:, 1, 3]) <= 1.2).all()
-    nearest = np.min(np.abs(np.abs(straight[:, 0, 3]) - 8.0))
-    assert nearest <= 0.8
+def scattered(seed):
+    """Return walls of points anywhere, and at -6 and 9 m along them few that face along them."""
+    rng, n, m = np.random.default_rng(seed), 3000, 360
+    y = rng.choice([-4.0, 4.0], n)
+    walls = np.stack((rng.uniform(-20, 20, n), y, rng.uniform(-1.5, 3, n)), -1)
+    facing = np.stack((np.where(rng.random(m) < 0.5, -6.0, 9.0),
+                       rng.choice([-1, 1], m) * rng.uniform(2.5, 4, m), rng.uniform(-1.5, 3, m)),
+                      -1)
+    across = np.stack((0 * y, -np.sign(y), 0 * y), -1)
+    return index_of(np.concatenate((walls, facing)),
+                    np.concatenate((across, np.tile([1.0, 0, 0], (m, 1)))))
 
 
-def test_icp_brings_all_placements_home(pillars):
-    """Across the walls at once, along them as far as the pillars pull."""
-    rng = np.random.default_rng(0)
-    starts = np.array([moved(*rng.uniform(-0.4, 0.4, 3), rng.uniform(-0.5, 0.5))
-                       for _ in range(8)])
-    for start, T in zip(starts, icp(pillars, pillars, starts, 5, 20), strict=True):
-        assert abs(T[1, 3]) < 0.02
-        assert errors(T, np.eye(4))[1] < 0.1
-        assert abs(T[0, 3]) < max(0.1, abs(start[0, 3]))
+def along(test):
+    """Return how far along x the competing poses lie from the answer, sorted, metres."""
+    return np.sort(test.competing[:, 0, 3] - test.T_target_source[0, 3])
 
 
-def test_information_of_two_walls(bare):
-    """Normals along y only: nothing holds x; the ground holds height, roll and pitch."""
-    matrix, lever = information(bare, bare, np.eye(4))
-    assert matrix[0, 0] == pytest.approx(0.0, abs=1e-9)
-    assert matrix[1, 1] == pytest.approx(1.0)
-    assert matrix[2, 2] == pytest.approx(0.3)
-    points = bare.points
-    assert lever == pytest.approx(np.sqrt((points**2).sum(axis=1).mean()), rel=0.02)
-    # turning about z moves a point on the wall by its x, across the wall
-    assert matrix[5, 5] == pytest.approx((points[:, 0]**2).mean() / lever**2, rel=0.05)
-    weak, _ = weak_directions(bare, bare, np.eye(4))
-    assert np.abs(weak[0]) == pytest.approx(ALONG_X, abs=1e-6)
+def straight(poses):
+    return np.abs(poses[:, 0, 0] - 1) < 1e-3
 
 
-def test_bare_walls_slide_without_end(bare):
-    found = hypothesis_test(bare, bare, np.eye(4), np.empty((0, 4, 4)), 30.0)
-    assert len(found.degenerate) == 1
-    assert np.abs(found.degenerate[0].twist) == pytest.approx(ALONG_X, abs=0.02)
-    assert found.degenerate[0].sigma == pytest.approx(30 / np.sqrt(3))
-    # but for the slide and half a turn there is nothing else
-    for rival in found.competing:
-        assert abs(rival[1, 3]) < 0.3
-        assert rival[0, 0] == pytest.approx(-1, abs=0.01)
-
-
-def test_pillars_hold_but_repeat(pillars):
-    found = hypothesis_test(pillars, pillars, np.eye(4), np.empty((0, 4, 4)), 30.0)
+@pytest.mark.parametrize(('pitch', 'shifts'), [(8.0, [-8, 8]), (5.0, [-10, -5, 5, 10])])
+def test_pillars_compete_one_pitch_apart_along_the_gallery(pitch, shifts):
+    """As many as explain enough of it: exactly those, where they belong, nothing turned."""
+    index = index_of(*gallery(pitch=pitch))
+    found = hypothesis_test(index, index, np.eye(4), NOTHING, 30.0)
+    np.testing.assert_allclose(found.T_target_source, np.eye(4), atol=1e-3)
+    np.testing.assert_allclose(along(found), shifts, atol=0.01)
+    np.testing.assert_allclose(found.competing[:, 1:3, 3], 0, atol=0.01)
+    np.testing.assert_allclose(found.competing[:, :3, :3] - np.eye(3), 0, atol=1e-3)
+    # the best first: what is nearer overlaps more
+    assert (np.diff(np.abs(found.competing[:, 0, 3])) > -0.01).all()
     assert found.degenerate == ()
-    assert errors(found.T_target_source, np.eye(4))[0] < 0.1
-    gaps = np.array([errors(T, moved(8.0 * round(T[0, 3] / 8)))[0] for T in found.competing])
-    assert (gaps < 0.5).sum() >= 2
+    assert not found.weak
+    np.testing.assert_array_equal(found.outcomes, score_keypoints(
+        index, index, found.T_target_source[None], 1000)[0])
+    np.testing.assert_array_equal(found.competing_outcomes, score_keypoints(
+        index, index, found.competing, 1000))
 
 
-def test_what_stands_once_leaves_one_placement():
-    """A single pillar on one side, and the gallery is itself in one way only."""
-    points, normals = gallery(pitch=200.0, offset=3.0)
-    once = view_of(points, normals)
-    found = hypothesis_test(once, once, np.eye(4), np.empty((0, 4, 4)), 30.0)
+def test_others_are_looked_for_within_the_radius():
+    """Pillars each 5 m: of those 5 and 10 m away only the nearer ones, from 7 m on."""
+    index = index_of(*gallery(pitch=5.0))
+    found = hypothesis_test(index, index, np.eye(4), NOTHING, 7.0)
+    np.testing.assert_allclose(along(found), [-5, 5], atol=0.01)
+
+
+def test_bare_walls_slide_and_look_the_same_from_behind(bare):
+    """One free direction, along them and without end; half a turn is the only other pose."""
+    found = hypothesis_test(bare, bare, np.eye(4), NOTHING, 30.0)
+    direction, = found.degenerate
+    np.testing.assert_allclose(np.abs(direction.twist), ALONG_X, atol=1e-3)
+    assert direction.sigma == pytest.approx(30 / np.sqrt(3))
+    assert direction.lever == pytest.approx(23.5, abs=0.1)
+    assert found.weak
+    turned, = found.competing
+    np.testing.assert_allclose(turned[:2, :2], -np.eye(2), atol=1e-3)
+    np.testing.assert_allclose(turned[1:3, 3], 0, atol=0.01)
+
+
+def test_what_stands_once_leaves_one_pose(once):
+    """The walls hardly hold it, the one pillar does: tried, and neither sliding nor ambiguous."""
+    found = hypothesis_test(once, once, np.eye(4), NOTHING, 30.0)
+    assert found.weak
     assert found.degenerate == ()
-    assert len(found.competing) == 0
+    assert found.competing.shape == (0, 4, 4)
+    assert found.competing_outcomes.shape == (0, 2000)
+    np.testing.assert_allclose(found.T_target_source, np.eye(4), atol=1e-3)
 
 
-def test_the_better_rival_wins(pillars):
-    """An answer a quarter of a pitch off meets the right one among its rivals."""
-    found = hypothesis_test(pillars, pillars, moved(4.0), np.array([np.eye(4)]), 30.0)
-    offset = found.T_target_source[0, 3]
-    assert abs(offset - 8 * round(offset / 8)) < 0.2
+def test_at_the_end_of_a_gallery_one_way_is_enough_to_slide():
+    """A wall across at 40 m stops it one way only while the other scan saw no wall."""
+    points, normals = gallery(pitch=0.0)
+    y, z = np.meshgrid(np.arange(-3.75, 4, 0.5), np.arange(-1.5, 3, 0.5))
+    end = np.stack((np.full(y.size, 40.0), y.ravel(), z.ravel()), -1)
+    closed = index_of(np.concatenate((points, end)),
+                      np.concatenate((normals, np.tile([-1.0, 0, 0], (len(end), 1)))))
+    direction, = hypothesis_test(index_of(points, normals), closed, np.eye(4), NOTHING, 30.0
+                                 ).degenerate
+    np.testing.assert_allclose(np.abs(direction.twist), ALONG_X, atol=1e-3)
+
+
+def test_a_better_pose_among_the_hypotheses_wins_and_is_tested_in_turn(pillars):
+    """From half a pitch off: the answer, and those that compete with it and not with the start."""
+    found = hypothesis_test(pillars, pillars, moved(4.0), moved()[None], 30.0)
+    np.testing.assert_allclose(found.T_target_source, np.eye(4), atol=1e-3)
+    np.testing.assert_allclose(along(found), [-8, 8], atol=0.01)
+    assert not found.weak, 'that of the answer'
+    np.testing.assert_array_equal(found.outcomes, score_keypoints(
+        pillars, pillars, found.T_target_source[None], 1000)[0])
+
+
+def test_the_winner_is_tested_once(pillars):
+    first = hypothesis_test(pillars, pillars, moved(4.0), moved()[None], 30.0, again=False)
+    np.testing.assert_allclose(first.T_target_source, np.eye(4), atol=1e-3)
+    assert first.weak, 'that of the start'
+
+
+def test_a_pose_on_its_way_arrives_before_it_competes():
+    """Half a turn fits 3 m on; the first rounds leave it 0.2 m short, where little pulls."""
+    source, target = scattered(0), scattered(1)
+    found = hypothesis_test(source, target, np.eye(4), NOTHING, 30.0)
+    assert not found.weak
+    turned, = found.competing
+    np.testing.assert_allclose(turned[:2, :2], -np.eye(2), atol=5e-3)
+    np.testing.assert_allclose(turned[:2, 3], [3.0, 0.0], atol=0.04)
+    np.testing.assert_array_equal(found.competing_outcomes[0], score_keypoints(
+        source, target, turned[None], 1000)[0])
 
 
 @pytest.mark.parametrize('start', [moved(0, 3.0), moved(0, 0, 30.0), moved(500)])
-def test_an_answer_that_nothing_speaks_for_is_no_error(bare, start):
-    """Beside the walls, above them, far away: there is nothing to compare with."""
-    found = hypothesis_test(bare, bare, start, np.empty((0, 4, 4)), 30.0)
-    assert found.T_target_source.shape == (4, 4)
-    assert found.competing.shape[1:] == (4, 4)
+def test_a_pose_that_nothing_explains_stays_where_it_is_and_unsupported(bare, start):
+    """Beside the walls, above them, far away: nothing to fit to, nothing in its favour."""
+    found = hypothesis_test(bare, bare, start, NOTHING, 30.0)
+    score = pose_score(found.outcomes)
+    if start[1, 3] == 3.0:    # near enough to the walls for the search to find them
+        assert score.overlap == 1.0
+        np.testing.assert_allclose(found.T_target_source[1:3, 3], 0, atol=0.01)
+    else:
+        np.testing.assert_array_equal(found.T_target_source, start)
+        assert score.overlap == 0.0
+        assert score.confidence == 0.0
 
 
-def test_slides_move_and_come_back():
-    slide = DegenerateDirection(np.array([0.8, 0.6, 0, 0, 0, 0]), 10.0, 20.0)
-    T = moved(3, 1, 0, 30)
-    far = perturbed_poses(T, 7 * slide.twist[None])[0]
-    assert far[:2, 3] == pytest.approx([3 + 5.6, 1 + 4.2])
-    assert slid_back(T, far, (slide,)) == pytest.approx(T)
-    aside = perturbed_poses(T, np.array([[-1.2, 1.6, 0, 0, 0, 0.0]]))[0]
-    assert slid_back(T, aside, (slide,)) == pytest.approx(aside)
+def test_level_poses_only_where_both_see_the_ground():
+    """A square tube fits itself under quarter turns about its axis, but for what is up."""
+    rolls = np.array([moved(roll_deg=angle) for angle in (90, 180, 270)])
+    level, free = tube(), tube(up=None)
+    for source, target, count in ((level, level, 0), (level, free, 3), (free, free, 3)):
+        found = hypothesis_test(source, target, np.eye(4), rolls, 30.0)
+        rolled = found.competing[found.competing[:, 2, 2] < 0.5]
+        assert len(rolled) == count
+        np.testing.assert_allclose(rolled[:, :3, 3], 0, atol=0.01)
+    # a level target takes poses that are rolled for the same as others that are not
+    found = _candidates(free, level, np.eye(4), moved(9, roll_deg=90)[None], NOT_WEAK, 30.0)
+    assert (found[:, 2, 2] < 0.5).any()
 
 
-def test_covariance_grows_along_the_slide_and_hardly_aside():
+def test_without_the_ground_check_what_is_up_may_be_a_wall():
+    rolls = np.array([moved(roll_deg=angle) for angle in (90, 180, 270)])
+    level = tube()
+    for check, count in ((True, 0), (False, 3)):
+        found = compete(level, level, np.eye(4), rolls, SgorConfig(ground_check=check))
+        assert (found.competing[:, 2, 2] < 0.5).sum() == count
+
+
+@pytest.mark.parametrize(('degrees', 'kept'), [(9.5, True), (10.5, False)])
+def test_a_pose_is_level_within_ten_degrees(bare, degrees, kept):
+    """Of the ground normals: a candidate far from any point stays as it was given."""
+    tilted = moved(300.0, roll_deg=degrees)
+    found = _candidates(bare, bare, np.eye(4), tilted[None], NOT_WEAK, 30.0)
+    assert (found[:, 0, 3] == 300.0).sum() == kept
+    # and so where the ground of one lies across
+    up = Rotation.from_euler('x', degrees, degrees=True).apply(UP)
+    askew = index_of(*gallery(pitch=0.0), up=up)
+    for pair in ((askew, bare), (bare, askew)):
+        found = _candidates(*pair, np.eye(4), moved(300.0)[None], NOT_WEAK, 30.0)
+        assert (found[:, 0, 3] == 300.0).sum() == kept
+
+
+def test_candidates_are_six_of_the_solver_and_those_of_the_maps(once):
+    """Those that differ, the first six; then peaks of the maps, roughly fitted."""
+    hypotheses = np.array([moved(100.0 * k) for k in (0, 1, 1, 2, 3, 4, 5, 6, 7, 8)])
+    found = _candidates(once, once, np.eye(4), hypotheses, NOT_WEAK, 30.0)
+    assert found[:6, 0, 3].tolist() == [100, 200, 300, 400, 500, 600]
+    assert (found[6:, 0, 3] < 40).all()
+    assert len(found) == 6 + 16
+    # beside the answer is on the answer after three rounds of those up to twice the distance
+    start = moved(1.0)
+    found = _candidates(once, once, moved(30.0), start[None], NOT_WEAK, 30.0)
+    np.testing.assert_array_equal(found[0], icp(once, once, start[None], 3, 0, 125)[0])
+
+
+def test_along_weak_directions_the_search_goes_on_step_by_step(bare):
+    """Every kind of pose but those that a push finds: two maximum distances and more away."""
+    found = _candidates(bare, bare, np.eye(4), NOTHING, ALONG_X[None], 30.0)
+    far = np.abs(found[straight(found), 0, 3])
+    assert len(far) >= 8
+    assert far.min() > 1.2
+    assert far.max() < 30.0
+    assert {-1, 1} == set(np.sign(found[straight(found), 0, 3]))
+
+
+def test_compete_with_radius_zero_scores_the_pose_alone(pillars):
+    config = SgorConfig(rival_radius=0.0)
+    T = moved(0.3)
+    for found in (compete(pillars, pillars, T, moved(8)[None], config),
+                  alone(pillars, pillars, T)):
+        assert found.T_target_source is T
+        np.testing.assert_array_equal(found.outcomes,
+                                      score_keypoints(pillars, pillars, T[None], 1000)[0])
+        assert found.competing.shape == (0, 4, 4)
+        assert found.competing_outcomes.shape == (0, 2000)
+        assert found.degenerate == ()
+        assert found.weak is False
+
+
+def test_a_pose_that_scores_too_low_gets_more_rounds():
+    """And is scored anew; what competes stays. One that scores enough is left as it is."""
+    source, target = scattered(4), scattered(5)
+    plain = hypothesis_test(source, target, np.eye(4), NOTHING, 30.0)
+    confidence = pose_score(plain.outcomes).confidence
+    assert 0.9 < confidence < 1
+    enough = compete(source, target, np.eye(4), NOTHING, SgorConfig(min_confidence=confidence))
+    np.testing.assert_array_equal(enough.T_target_source, plain.T_target_source)
+    more = compete(source, target, np.eye(4), NOTHING, SgorConfig(min_confidence=0.999))
+    T = icp(source, target, plain.T_target_source[None], 10, 10)
+    assert not np.array_equal(T[0], plain.T_target_source)
+    np.testing.assert_array_equal(more.T_target_source, T[0])
+    assert not np.array_equal(more.outcomes, plain.outcomes)
+    np.testing.assert_array_equal(more.outcomes, score_keypoints(source, target, T, 1000)[0])
+    np.testing.assert_array_equal(more.competing, plain.competing)
+    np.testing.assert_array_equal(more.competing_outcomes, plain.competing_outcomes)
+
+
+def test_compete_looks_within_the_rival_radius():
+    index = index_of(*gallery(pitch=5.0))
+    for radius, shifts in ((7.0, [-5, 5]), (30.0, [-10, -5, 5, 10])):
+        found = compete(index, index, np.eye(4), NOTHING, SgorConfig(rival_radius=radius))
+        np.testing.assert_allclose(along(found), shifts, atol=0.01)
+
+
+def rows_of(*counts, n=100):
+    """Return outcomes with so many agreeing and violating keypoints each."""
+    rows = np.zeros((len(counts), n), np.int8)
+    for row, (agrees, violates) in zip(rows, counts, strict=True):
+        row[:agrees] = 1
+        row[n - violates:] = -1
+    return rows
+
+
+def test_distinct_poses_come_best_first_and_once(bare):
+    """By exclusive violations, then by support; of those that lie together the best."""
+    poses = np.array([moved(), moved(10), moved(20), moved(10.3), moved(30), moved(0.3),
+                      moved(40)])
+    outcomes = rows_of((100, 0), (80, 0), (90, 0), (85, 0), (70, 0), (99, 0), (97, 3))
+    standing = np.array([False, True, True, True, True, True, False])
+    kept = _distinct(poses, outcomes, 0, standing, (), bare)
+    assert kept == [2, 3, 4]
+    standing[6] = True    # 3 violations are worse than any lack of support
+    assert _distinct(poses, outcomes, 0, standing, (), bare) == [2, 3, 4, 6]
+    # where the answer itself violates what they explain they come first
+    outcomes[0, :50] = -1
+    outcomes[4, :] = 1
+    outcomes[6] = outcomes[0]
+    assert _distinct(poses, outcomes, 0, standing, (), bare)[0] == 4
+
+
+def test_distinct_poses_of_the_same_rank_stay_in_their_order(bare):
+    poses = np.array([moved(), moved(30), moved(10), moved(20)])
+    outcomes = rows_of((100, 0), (90, 0), (90, 0), (90, 0))
+    standing = np.array([False, True, True, True])
+    assert _distinct(poses, outcomes, 0, standing, (), bare) == [1, 2, 3]
+    assert _distinct(poses, outcomes, 0, np.zeros(4, np.bool_), (), bare) == []
+
+
+def test_what_is_the_answer_but_for_a_slide_is_no_other_pose(bare):
+    """Nor are two poses that differ by the slide only two."""
     slide = DegenerateDirection(ALONG_X, 10.0, 20.0)
-    grown = inflated(np.eye(6) * 1e-4, (slide,))
-    sigma = np.sqrt(np.diag(grown))
-    assert sigma[0] == pytest.approx(10.0, rel=1e-3)
-    assert sigma[1:3] == pytest.approx([0.1, 0.1], rel=0.01)
-    assert (sigma[3:] < 0.012).all()
-    assert 'slide along (1.00, 0.00, 0.00)' in in_words((slide,))
-    turn = DegenerateDirection(np.array([0, 0, 0, 0, 0, 0.05]), 10.0, 20.0)
-    assert 'turn about (0.00, 0.00, 1.00)' in in_words((turn,))
-
-
-def scans_of(kind, seed, count, low, high, *, labels):
-    """Return pairs of scans of a place, and the truth of each: T_target_source."""
-    place = scenes.make(kind, seed)
-    lidar, rng = Lidar(beams=64, columns=900), np.random.default_rng(seed)
-    pairs = []
-    for _ in range(count):
-        poses = scenes.random_pair(place, rng, low, high)
-        scans = [lidar.scan(place, pose, rng) for pose in poses]
-        source, target = (SemanticScan(points, ids if labels else None) for points, ids in scans)
-        pairs.append((source, target, relative(poses[1], poses[0])))
-    return pairs
-
-
-@pytest.mark.parametrize('labels', [True, False])
-@pytest.mark.parametrize('kind', ['tunnel', 'tunnel_lamps_12', 'corridor', 'facade',
-                                  'orchard_regular', 'parking_regular'])
-def test_nothing_is_certain_where_places_repeat(kind, labels):
-    low, high = scenes.KINDS[kind].distances
-    for source, target, truth in scans_of(kind, 50, 3, low, high, labels=labels):
-        result = register(source, target)
-        if result.success:
-            metres, degrees = errors(result.T_target_source, truth)
-            assert metres < 0.6
-            assert degrees < 5
-            continue
-        assert result.reason
-        assert not (result.alternatives and len(result.degenerate))
-        if len(result.degenerate):
-            T = result.T_target_source
-            error = np.concatenate((T[:3, 3] - truth[:3, 3], Rotation.from_matrix(
-                T[:3, :3] @ truth[:3, :3].T).as_rotvec()))
-            assert error @ np.linalg.solve(result.covariance, error) < BOUND
-        elif result.alternatives:
-            assert 'ambiguous' in result.reason
-            assert result.confidence <= 0.5
-
-
-@pytest.mark.parametrize('kind', ['field', 'garage_half_full', 'courtyard'])
-def test_what_is_unique_is_found(kind):
-    for source, target, truth in scans_of(kind, 60, 2, 2.0, 8.0, labels=True):
-        result = register(source, target)
-        assert result.success, result.reason
-        metres, degrees = errors(result.T_target_source, truth)
-        assert metres < 0.1
-        assert degrees < 0.5
-
-
-@pytest.mark.parametrize('kind', ['tunnel', 'facade', 'highway'])
-def test_different_places_of_one_kind_are_told_apart(kind):
-    lidar = Lidar(beams=64, columns=900)
-    rng = np.random.default_rng(7)
-    indexes = []
-    for seed in (70, 71, 72):
-        place = scenes.make(kind, seed)
-        indexes.append(SemanticScan(*lidar.scan(place, scenes.random_pose(place, rng), rng)))
-    for source, target in pairwise(indexes):
-        result = register(source, target)
-        assert not result.success
+    poses = np.array([moved(3), moved(12), moved(0, 2), moved(9, 2), moved(0, 0, 0, 180),
+                      moved(7, 0, 0, 180)])
+    outcomes = rows_of(*[(100 - k, 0) for k in range(6)])
+    standing = np.ones(6, np.bool_)
+    assert _distinct(poses, outcomes, 0, standing, (slide,), bare) == [2, 4]
+    assert _distinct(poses, outcomes, 0, standing, (), bare) == [1, 2, 3, 4, 5]

@@ -1,6 +1,7 @@
 """Label conventions: what the ids of a scan mean, whoever wrote them."""
-from pathlib import Path
+import json
 import re
+import sys
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from sgor_ros import preprocess
 from sgor_ros import SemanticScan
 from sgor_ros import SgorConfig
 from sgor_ros.core.scan.labels import label_convention
+from sgor_ros.core.scan.labels import TABLES
 
 CAR, ROAD, BUILDING, VEGETATION, POLE = 1, 9, 13, 15, 18    # classes inside
 CONVENTIONS = ('semantickitti', 'semantickitti_train', 'nuscenes', 'nuscenes16',
@@ -32,7 +34,6 @@ PUBLISHED = {
              'Vegetation Terrain Sky Pedestrians Rider Car Truck Bus Train Motorcycle Bicycle '
              'Static Dynamic Other Water RoadLines Ground Bridge RailTrack GuardRail',
 }
-ROOT = Path(__file__).resolve().parents[3]
 
 
 def decode(name, ids):
@@ -92,8 +93,8 @@ def test_the_same_thing_is_the_same_class_in_all_conventions(ids):
 def test_ids_are_those_of_the_published_list(name):
     """Each id stands beside its published name, all are listed, noise is dropped."""
     published = PUBLISHED[name].split()
-    text = (ROOT / f'config/labels/{name}.yaml').read_text().split('ground:')[0]
-    written = {int(i): word for i, word in re.findall(r'^  (\d+): \d+ +# (\S+)$', text, re.M)}
+    text = (TABLES / f'{name}.toml').read_text()
+    written = {int(i): word for i, word in re.findall(r'^(\d+) = \d+ +# (\S+)$', text, re.M)}
     convention = label_convention(name)
     for i, word in enumerate(published):
         assert written.get(i, 'dropped') == word or i in convention.drop
@@ -208,6 +209,35 @@ def test_a_table_of_the_user(tmp_path):
     assert decode(str(path), [8])[2] == [8]
 
 
+def test_a_table_is_the_same_in_each_format(tmp_path, monkeypatch):
+    """TOML and JSON without any package; YAML needs one, and says which."""
+    table = {'mask': 0xFF, 'classes': {'3': 9, '4': 13}, 'ground': [9], 'names': {'9': 'floor'}}
+    lines = 'mask = 0xFF\nground = [9]\n[classes]\n3 = 9\n4 = 13\n[names]\n9 = "floor"\n'
+    found = []
+    for suffix, text in (('toml', lines), ('json', json.dumps(table)),
+                         ('yaml', yaml.safe_dump(table))):
+        path = tmp_path / f'table.{suffix}'
+        path.write_text(text)
+        one = label_convention(str(path))
+        found.append((one.mask, one.classes, one.names, one.ground, one.movable, one.drop))
+    assert found == [(0xFF, {3: 9, 4: 13}, {9: 'floor'}, {9}, frozenset(), frozenset())] * 3
+    monkeypatch.setitem(sys.modules, 'yaml', None)
+    label_convention.cache_clear()
+    assert label_convention(str(tmp_path / 'table.toml')).mask == 0xFF
+    with pytest.raises(InputError, match='pip install pyyaml'):
+        label_convention(str(tmp_path / 'table.yaml'))
+
+
+@pytest.mark.parametrize(('suffix', 'text'), [
+    ('toml', '[classes'), ('toml', 'classes = 3'), ('json', '{"classes": '), ('json', '[1]'),
+    ('json', '{"classes": {"1": 300}, "ground": [], "names": {}}')])
+def test_broken_tables_of_other_formats_are_named(tmp_path, suffix, text):
+    path = tmp_path / f'broken.{suffix}'
+    path.write_text(text)
+    with pytest.raises(InputError, match=rf'label_convention = .*broken\.{suffix}'):
+        label_convention(str(path))
+
+
 @pytest.mark.parametrize('text', [
     '', 'classes: [1, 2', 'classes: {1: 2}', '- 1\n- 2', 'just words',
     'classes: {1: 300}\nground: []\nnames: {}', 'classes: {-1: 3}\nground: []\nnames: {}',
@@ -242,7 +272,7 @@ def test_names_that_are_none(name):
 
 
 def test_a_mask_has_32_bits(tmp_path):
-    text = (Path(__file__).parents[3] / 'config/labels/nuscenes.yaml').read_text()
-    (tmp_path / 'a.yaml').write_text(f'{text}\nmask: {2**63}\n')
+    text = (TABLES / 'nuscenes.toml').read_text()
+    (tmp_path / 'a.toml').write_text(text.replace('mask = 0xFFFFFFFF', f'mask = {2**62}'))
     with pytest.raises(InputError, match='mask must be in 0 to 0xFFFFFFFF'):
-        label_convention(str(tmp_path / 'a.yaml'))
+        label_convention(str(tmp_path / 'a.toml'))

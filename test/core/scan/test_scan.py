@@ -150,3 +150,47 @@ def test_labels_are_checked_against_the_points_as_given():
     assert SemanticScan(points, [1, 2, 3]).labels.tolist() == [1, 3]
     with pytest.raises(InputError, match='labels'):
         SemanticScan(points, [1, 3])
+
+
+@pytest.mark.parametrize('kind', [np.float32, np.float64])
+def test_a_scan_keeps_no_buffer_of_the_caller(kind):
+    """A driver fills one buffer again and again."""
+    points, labels = np.full((10, 3), 5, kind), np.full(10, 40, np.int64)
+    scan = SemanticScan(points, labels)
+    points[:], labels[:] = 7, 50
+    assert (scan.points == 5).all()
+    assert (scan.labels == 40).all()
+    view = np.asfortranarray(np.full((10, 4), 5, kind))
+    scan = SemanticScan(view[:, :3])
+    view[:] = 7
+    assert (scan.points == 5).all()
+    assert scan.points.flags.c_contiguous
+
+
+def test_rounding_of_map_coordinates_is_told():
+    """UTM northings are kept to a quarter of a metre; the scan is refused, and both are said."""
+    rng = np.random.default_rng(0)
+    points = rng.uniform(-20, 20, (5000, 3))
+    at = points + [4e5, 5.4e6, 100]
+    scan = SemanticScan(at)
+    worst = np.abs(scan.points - at).max(axis=1)
+    assert scan.rounding == np.median(worst) > 0.1
+    warning, = (w for w in preprocess(scan).warnings if 'float32' in w)
+    assert warning.startswith('points: ')
+    assert 'by 0.13 m' in warning
+    result = register(scan, SemanticScan(points))
+    assert not result.success
+    assert any('source: points: rounded' in w for w in result.warnings)
+    assert any('beyond max_range' in w and 'in the frame of the sensor' in w
+               for w in result.warnings)
+
+
+def test_rounding_that_is_nothing_is_not_told():
+    """Near the sensor; for float32, which has nothing to lose; for a few points far off."""
+    rng = np.random.default_rng(0)
+    points = rng.uniform(-20, 20, (5000, 3))
+    for given in (points, (points + 5.4e6).astype(np.float32),
+                  np.concatenate((points, np.full((20, 3), 1e7)))):
+        scan = SemanticScan(given)
+        assert scan.rounding < 1e-5
+        assert not any('float32' in w for w in preprocess(scan).warnings)

@@ -1,4 +1,5 @@
 """Hints: what is wrong with the scans is said, and nothing is said of scans that are right."""
+from dataclasses import replace
 import re
 
 from conftest import errors
@@ -79,6 +80,7 @@ def test_few_matches_say_nothing_of_size(street):
     target, source = scans_of(street, 0, 3)
     result = register(SemanticScan(source.points * np.float32(1.02), source.labels), target)
     rows = np.flatnonzero(result.inliers)[:20]
-    few = type(result)(True, '', result.T_target_source, result.source_points[rows],
-                       result.target_points[rows], np.ones(20, bool), confidence=1.0)
+    few = replace(result, source_points=result.source_points[rows],
+                  target_points=result.target_points[rows], inliers=np.ones(20, bool))
+    assert scale_hint(result, SgorConfig()) != ''
     assert scale_hint(few, SgorConfig()) == ''

@@ -1,21 +1,30 @@
-"""Where compiled code is kept: numba reads it as it is loaded, so it is decided without numba.
+"""Where compiled code is kept, for processes that are ours: the node and the commands.
 
 Numba keeps compiled code beside the source or, where that cannot be written, in the user's cache,
 and gives up where neither can, as in a container of which only /tmp can be. It does not look
 beside the source for what it may only read: whoever uses a package that somebody else installed
 and compiled would compile everything again.
+
+Nothing of this happens at import: a program that uses the library has numba's own behaviour,
+unless it calls `choose_cache_folder`.
 """
 from contextlib import suppress
 import os
 from pathlib import Path
+import sys
 import tempfile
 
 VARIABLE = 'NUMBA_CACHE_DIR'
-PACKAGE = Path(__file__).parent
+PACKAGE = Path(__file__).parents[2]
 
 
 def choose_cache_folder() -> None:
-    """Find compiled code that came with the package; name a folder where numba has none."""
+    """Find compiled code that came with the package; name a folder where numba has none.
+
+    To be called before the first ``from sgor_ros import ...``: each kernel looks for its folder as
+    it is loaded. Sets ``NUMBA_CACHE_DIR`` where numba would give up, and copies files into the
+    user's cache where the package can't be written.
+    """
     if os.environ.get(VARIABLE) or _writable(PACKAGE):
         return
     user = Path(os.environ.get('XDG_CACHE_HOME') or os.path.expanduser('~/.cache'))
@@ -24,6 +33,9 @@ def choose_cache_folder() -> None:
     else:
         folder = _private_folder()
         os.environ[VARIABLE] = str(folder)
+        if 'numba' in sys.modules:    # it has read its environment already
+            from numba import config
+            config.CACHE_DIR = str(folder)  # type: ignore[attr-defined]
     with suppress(OSError):    # a full disk, for one: then it is compiled
         _copy_installed(folder)
 
