@@ -209,3 +209,12 @@ def test_published_behaviour_on_real_matches(name):
 
 def test_percent_is_printed_as_in_the_literature():
     assert percent([True] * 549 + [False] * 6) == '98.92'
+
+
+def test_the_former_name_of_an_answer_is_told():
+    from sgor_ros.evaluation import methods
+    with pytest.warns(DeprecationWarning, match='Solution is Answer now'):
+        former = methods.Solution
+    assert former is methods.Answer
+    with pytest.raises(AttributeError, match='Reply'):
+        _ = methods.Reply
