@@ -69,19 +69,19 @@ def make_tasks(arguments) -> list[str]:
     """Write matches and scans into the folder; return the names of what is to be timed."""
     from sgor_ros.commands.benchmarks.inputs import WORLD_SCANS
     from sgor_ros.commands.benchmarks.inputs import WORLD_SPEED
-    from sgor_ros.evaluation.pairs import selection
-    from sgor_ros.evaluation.protocols.solver import fpfh_matches
-    from sgor_ros.evaluation.protocols.solver import made_up
+    from sgor_ros.evaluation.protocols import pairs as pairing
+    from sgor_ros.evaluation.solver import fpfh_matches
+    from sgor_ros.evaluation.solver import made_up
     from sgor_ros.io.datasets import open_drives
     FOLDER.mkdir(parents=True, exist_ok=True)
     if arguments.data:
-        candidates = (selection.listed_pairs(arguments.data, 36.0)
-                      + selection.near_pairs(open_drives(arguments.data), 36.0))
+        candidates = (pairing.listed_pairs(arguments.data, 36.0)
+                      + pairing.near_pairs(open_drives(arguments.data), 36.0))
     else:
         from sgor_ros.world import simulate
-        candidates = selection.near_pairs([selection.drive_of('street', (
+        candidates = pairing.near_pairs([pairing.drive_of('street', (
             scan[1:] for scan in simulate(WORLD_SCANS, 0, speed=WORLD_SPEED)))], 36.0)
-    chosen = selection.choose(candidates, arguments.pairs, 0)
+    chosen = pairing.choose(candidates, arguments.pairs, 0)
     sets = [(f'made up, {count}', made_up(count, 0.02, 0)) for count in arguments.counts]
     sets += [(f'FPFH, {m.name}', m) for m in fpfh_matches(chosen, 8000)]
     tasks = []
@@ -89,7 +89,7 @@ def make_tasks(arguments) -> list[str]:
         np.savez(FOLDER / f'{name}.npz', source=pair.matches.source, target=pair.matches.target)
         tasks += [f'{name}, default', f'{name}, paper']
     for pair in chosen:
-        name = f'two raw scans, {pair.group}, {pair.distance_m:.0f} m'
+        name = f'two raw scans, {pair.data_set}, {pair.distance_m:.0f} m'
         source, target = pair.source.read(), pair.target.read()
         np.savez(FOLDER / f'{name}.npz', source=source.points, target=target.points)
         tasks.append(f'{name}, default')

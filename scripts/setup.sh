@@ -61,7 +61,7 @@ say "Python: $python"
 mapfile -t packages < <(missing_packages "$python")
 [ ${#packages[@]} -eq 0 ] || install_packages "${packages[@]}"
 
-extras=open3d,evaluation,test,docs,dev
+extras=commands,open3d,evaluation,test,docs,dev
 options=() pins=()
 if [ "${ROS_DISTRO:-}" = jazzy ] && "$python" -c 'import rclpy' 2>/dev/null; then
     say 'ROS 2 Jazzy is here: using its rclpy'

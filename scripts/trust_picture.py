@@ -25,7 +25,7 @@ from sgor_ros.core.scoring.pose_scoring import AGREES
 from sgor_ros.core.scoring.pose_scoring import pose_score
 from sgor_ros.core.scoring.pose_scoring import score_keypoints
 from sgor_ros.core.scoring.pose_scoring import VIOLATES
-from sgor_ros.io.colours import REJECTED
+from sgor_ros.io.colours import DIFFERENT
 from sgor_ros.io.colours import SOURCE
 from sgor_ros.io.colours import TARGET
 from sgor_ros.world import Lidar
@@ -74,7 +74,7 @@ def main() -> None:
     grid[1, 0].set_ylabel('another placement', fontsize=12)
     for colour, marker, label in ((TARGET, 's', 'target scan'), (SOURCE, 's', 'source scan'),
                                   ('white', 'o', 'where the two sensors stood'),
-                                  (REJECTED, 'o', 'hangs where the other sensor saw through')):
+                                  (DIFFERENT, 'o', 'hangs where the other sensor saw through')):
         grid[0, 0].plot([], [], marker, color=colour, label=label, ms=8,
                         mec='black' if colour == 'white' else colour)
     figure.legend(*grid[0, 0].get_legend_handles_labels(), loc='outside lower center', ncols=4,
@@ -146,7 +146,7 @@ def draw(axes: Any, example: Example, T: Array, width: float) -> None:
     asked = [se3.transform(pose, scan.index.points[thin(len(scan.index.points), ASKED)])
              for scan, pose in ((source, W @ T), (target, W))]
     against = np.vstack(asked)[outcomes == VIOLATES]
-    axes.plot(*against[:, :2].T, 'o', color=REJECTED, ms=3.2, mew=0)
+    axes.plot(*against[:, :2].T, 'o', color=DIFFERENT, ms=3.2, mew=0)
     for pose, colour in ((W, TARGET), (W @ T, SOURCE)):
         axes.plot(*pose[:2, 3], 'o', ms=9, mfc='white', mec=colour, mew=2.5, zorder=5)
     found = pose_score(outcomes)

@@ -1,4 +1,4 @@
-"""`sgor_benchmark`: SGOR and its rivals on the same scans in the same run."""
+"""`sgor_benchmark`: SGOR and other methods on the same scans in the same run."""
 from argparse import ArgumentParser
 from argparse import Namespace
 from collections.abc import Iterator
@@ -9,7 +9,6 @@ import sys
 from typing import Protocol
 
 from ..core.warmup import warm_up
-from ..evaluation.extra import require_evaluation
 from ..io.writing import free_folder
 from ..io.writing import new_folder
 from .benchmarks import ablation
@@ -49,7 +48,6 @@ def main(argv: list[str] | None = None) -> int:
 
 def measure(arguments: Namespace) -> int:
     """Run one of the benchmarks on some cores, into a folder of its own."""
-    require_evaluation()
     output = arguments.output or free_folder(Path('out/benchmark') / arguments.command)
     with _cores(arguments.cores), new_folder(output) as place:
         warm_up(default_config(arguments))
@@ -60,8 +58,8 @@ def measure(arguments: Namespace) -> int:
 
 def _parser() -> Parser:
     top = Parser(
-        'sgor_benchmark', 'COMMAND [options]', 'Measure SGOR and its rivals on your own data or '
-        'on the built-in world. Each command prints a table and writes table.md, rows.csv, '
+        'sgor_benchmark', 'COMMAND [options]', 'Measure SGOR and other methods on your own data '
+        'or on the built-in world. Each command prints a table and writes table.md, rows.csv, '
         'run.json and a plot into a new folder.',
         ('sgor_benchmark pairs --world', 'sgor_benchmark sequence --data sequences/08',
          'sgor_benchmark wrong --help'))
@@ -92,7 +90,7 @@ def _add_common(command: ArgumentParser) -> None:
 
 @contextmanager
 def _cores(count: int) -> Iterator[None]:
-    """Hold this process, and the rivals' threads with it, to some cores."""
+    """Hold this process, and the threads of all methods with it, to some cores."""
     before = os.sched_getaffinity(0)
     os.sched_setaffinity(0, sorted(before)[:count])
     try:

@@ -15,11 +15,11 @@ from tqdm import tqdm
 
 from ..core.common.settings import InputError
 from ..core.config import SgorConfig
-from ..evaluation.extra import require_evaluation
-from ..evaluation.metrics.trajectory import trajectory_errors
-from ..evaluation.metrics.trajectory import TrajectoryErrors
-from ..evaluation.report.trajectory_plots import plot_against_truth
-from ..evaluation.report.trajectory_plots import plot_errors
+from ..evaluation.metrics.trajectory import require_evo
+from ..evaluation.metrics.trajectory import track_errors
+from ..evaluation.metrics.trajectory import TrackErrors
+from ..evaluation.report.track_plots import plot_against_truth
+from ..evaluation.report.track_plots import plot_errors
 from ..io.bags import BagReader
 from ..io.bags import CLOUD_TYPE
 from ..io.messages import matrix_of
@@ -57,7 +57,6 @@ def main(arguments: list[str] | None = None) -> int:
 
 def play(options: argparse.Namespace) -> int:
     """Run the demo; 1 where the node did badly."""
-    require_evaluation()
     try:
         return _run(options)
     except TimeoutError as error:
@@ -104,6 +103,7 @@ def _run(options: argparse.Namespace) -> int:
         raise InputError(f'no ROS 2 here ({error}): source /opt/ros/jazzy/setup.bash, or pip '
                          "install 'ros-jazzy-rclpy[fastrtps]' ros-jazzy-common-interfaces"
                          ) from error
+    require_evo()
     out: Path = options.out
     try:
         out.mkdir(parents=True, exist_ok=True)
@@ -189,7 +189,7 @@ def _compare(player: 'Player', truth: dict[int, Array], world: WorldMap, memory_
         return _fail(f'{len(answered)} odometry messages for {len(sent)} scans; '
                      f'see {out}/node.log')
     stamps = [sent[i] for i in answered]
-    errors = trajectory_errors(np.array([poses[stamp] for stamp in stamps]),
+    errors = track_errors(np.array([poses[stamp] for stamp in stamps]),
                           np.array([truth[stamp] for stamp in stamps]))
     seconds = np.array([float(told[stamp]['seconds']) if stamp in told else np.nan
                         for stamp in stamps])
@@ -221,7 +221,7 @@ def slowness(answered: int, sent: int, seconds: Array, rate: float) -> str:
 
 
 def report(sent: int, counts: dict[str, str], seconds: Array, latency: Array,
-           errors: TrajectoryErrors, memory_mb: list[float]) -> str:
+           errors: TrackErrors, memory_mb: list[float]) -> str:
     """Return the table of the demo; `counts` is what the node told of the last scan."""
     drift = errors.drift
     rows = [
@@ -232,8 +232,8 @@ def report(sent: int, counts: dict[str, str], seconds: Array, latency: Array,
         ('  failed', counts['failed']),
         ('time per scan', _spread(1e3 * seconds, '{:.0f} ms', (50, 95, 99))),
         ('cloud sent to odometry heard', _spread(1e3 * latency, '{:.0f} ms', (50, 95, 99))),
-        ('RE of consecutive pairs', _spread(errors.rpe_rotation_deg, '{:.3f} deg')),
-        ('TE of consecutive pairs', _spread(100 * errors.rpe_translation_m, '{:.2f} cm')),
+        ('RE of consecutive pairs', _spread(errors.rotation_deg, '{:.3f} deg')),
+        ('TE of consecutive pairs', _spread(100 * errors.translation_m, '{:.2f} cm')),
         ('drift', f'{drift.translation_percent:.2f} %, {drift.rotation_deg_per_m:.4f} deg/m'
          if drift.stretches else 'the drive is too short'),
         (f'end of the track, after {errors.length_m:.0f} m',

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
-from ..evaluation.report.trajectory_plots import plot_track
+from ..evaluation.report.track_plots import plot_track
 from ..io.environment import describe_environment
 from ..io.stream_config import StreamConfig
 from ..io.trajectories import write_kitti

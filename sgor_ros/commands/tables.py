@@ -4,35 +4,36 @@ from collections.abc import Callable
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
+from importlib import import_module
 from pathlib import Path
 import sys
 
 from ..core.common.settings import InputError
 from ..core.config import SgorConfig
 from ..core.warmup import warm_up
-from ..evaluation import runner
-from ..evaluation.extra import require_evaluation
-from ..evaluation.methods import imported
+from ..evaluation.front_end import Features
+from ..evaluation.methods import available
 from ..evaluation.methods import Method
-from ..evaluation.methods import rivals_on_matches
-from ..evaluation.methods import rivals_on_scans
-from ..evaluation.methods.sgor import on_matches
-from ..evaluation.methods.sgor import on_scans
-from ..evaluation.pairs.front_end import Features
-from ..evaluation.pairs.selection import listed_pairs
-from ..evaluation.pairs.truth import refined
+from ..evaluation.methods import ON_MATCHES
+from ..evaluation.methods import ON_SCANS
+from ..evaluation.methods import sgor
+from ..evaluation.methods import sgor_solver
+from ..evaluation.methods.interface import OnMatches
+from ..evaluation.protocols import pairs as pairing
 from ..evaluation.protocols import studies
 from ..evaluation.protocols.ablation import PAPER_ROWS
-from ..evaluation.protocols.given import given_matches
+from ..evaluation.protocols.drives import posed
+from ..evaluation.protocols.drives import strided
 from ..evaluation.protocols.indoor import depth_frames
 from ..evaluation.protocols.indoor import threedmatch
 from ..evaluation.protocols.kitti import kitti_10m
 from ..evaluation.protocols.kitti import kitti_10m_list
 from ..evaluation.protocols.kitti import kitti_loops
-from ..evaluation.protocols.posed import posed
-from ..evaluation.protocols.posed import strided
+from ..evaluation.protocols.match_files import given_matches
 from ..evaluation.protocols.protocol import Protocol
-from ..evaluation.report import protocol_page
+from ..evaluation.protocols.truth import refined
+from ..evaluation.report import page
+from ..evaluation.runner import run
 from ..io.datasets import Drive
 from ..io.datasets import DriveScan
 from ..io.datasets import open_drives
@@ -77,7 +78,7 @@ def _parser() -> command_line.Parser:
     add('--limit', type=int, default=0, metavar='PAIRS', help='evenly spread; 0: all')
     add('--methods', nargs='+', metavar='NAME', help='of the table; default: all that there are')
     add('--method', action='append', default=[], metavar='MODULE:FUNCTION',
-        help='one of your own: takes Matches, returns an Estimate')
+        help='one of your own: takes Matches, returns an Answer')
     add('--raw', action='store_true',
         help='also what registers raw scans: SGOR with all of ours, and KISS-Matcher')
     add('--study', choices=[*studies.STUDIES, ABLATION], default='',
@@ -96,7 +97,6 @@ def _parser() -> command_line.Parser:
 
 
 def _tables(arguments: Namespace) -> int:
-    require_evaluation()
     output: Path = arguments.output or Path('out') / arguments.protocol
     protocol = PROTOCOLS[arguments.protocol](arguments)
     if not protocol.pairs:
@@ -113,34 +113,44 @@ def _tables(arguments: Namespace) -> int:
     inputs.say(f'{protocol.name}: {len(protocol.pairs)} pairs, {len(methods)} methods; {output}')
     warm_up(protocol.front_end)
     features = None if arguments.features is None else Features(arguments.features)
-    rows = runner.run(protocol, methods, output, features=features,
+    rows = run(protocol, methods, output, features=features,
                   variants=studies.variants(study, arguments.values, arguments.seed),
                   processes=arguments.processes, dask=arguments.dask)
-    print(protocol_page.write(output, rows, protocol, methods, study, features))
+    print(page.write(output, rows, protocol, methods, study, features))
     return command_line.OK
 
 
 def _methods(arguments: Namespace, protocol: Protocol) -> list[Method]:
     own = protocol.front_end
     if arguments.study == ABLATION:
-        rows = {row.method: own.replace(**row.changes) for row in PAPER_ROWS}
-        return [on_matches(name, config, config) for name, config in rows.items()]
-    methods = [on_matches('SGOR', own), *rivals_on_matches(inputs.say).values()]
+        configs = {row.method: own.replace(**row.changes) for row in PAPER_ROWS}
+        return [sgor_solver(name, config, config) for name, config in configs.items()]
+    methods = [sgor_solver('SGOR', own), *available(ON_MATCHES, inputs.say).values()]
     if arguments.raw and all(pair.matches is None for pair in protocol.pairs):
-        methods += [on_scans('SGOR, all of ours, from scans', _everything(protocol)),
-                    *rivals_on_scans(inputs.say).values()]
+        methods += [sgor('SGOR, all of ours, from scans', _everything(protocol)),
+                    *available(ON_SCANS, inputs.say).values()]
     if arguments.methods:
         known = {method.name: method for method in methods}
         wrong = [name for name in arguments.methods if name not in known]
         if wrong:
             raise InputError(f'--methods {wrong[0]}: not one of {", ".join(known)}')
         methods = [known[name] for name in arguments.methods]
-    return methods + [imported(name) for name in arguments.method]
+    return methods + [Method(name, on_matches=_imported(name)) for name in arguments.method]
 
 
 def _everything(protocol: Protocol) -> SgorConfig:
     return SgorConfig.indoor() if 'depth' in protocol.name or '3d' in protocol.name \
         else SgorConfig()
+
+
+def _imported(name: str) -> OnMatches:
+    module, _, function = name.partition(':')
+    sys.path.insert(0, '')
+    try:
+        found: OnMatches = getattr(import_module(module), function)
+    except (ImportError, AttributeError, ValueError) as error:
+        raise InputError(f'--method {name}: expected MODULE:FUNCTION: {error}') from error
+    return found
 
 
 def _drives(arguments: Namespace) -> list[Drive]:
@@ -161,7 +171,7 @@ def _kitti_10m(arguments: Namespace) -> Protocol:
 
 
 def _poses(arguments: Namespace) -> Protocol:
-    listed = (listed_pairs(arguments.data, arguments.max_distance)
+    listed = (pairing.listed_pairs(arguments.data, arguments.max_distance)
               if arguments.data else [])
     return posed(_drives(arguments), arguments.max_distance, listed)
 
@@ -182,8 +192,8 @@ def _finder(arguments: Namespace) -> Callable[[int, int], DriveScan | None]:
     """Return what finds scan i of a sequence: in a folder of its number."""
     if arguments.data is None:
         raise InputError('--list needs --data: the folder of the sequences')
-    drives = {d.name.rpartition('/')[2]: {scan.name.rpartition('/')[2]: scan
-                                          for scan in d.scans}
+    drives = {d.name.rpartition('/')[2]: {frame.name.rpartition('/')[2]: frame
+                                          for frame in d.scans}
               for d in open_drives(arguments.data)}
     return lambda sequence, scan: drives.get(f'{sequence:02d}', {}).get(f'{scan:06d}')
 

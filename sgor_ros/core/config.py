@@ -36,7 +36,8 @@ class SgorConfig(Ablation):
         minimum=0.0, maximum=10.0, group='space')
     label_convention: str = setting(
         'semantickitti', 'What the label ids mean: semantickitti, semantickitti_train, nuscenes, '
-        'nuscenes16, autoware_frnet, autoware_ptv3, carla, rellis or the path of a YAML file',
+        'nuscenes16, autoware_frnet, autoware_ptv3, carla, rellis or the path of a TOML, '
+        'JSON or YAML file',
         group='sensor')
     min_range: float = setting(
         1.0, 'Points nearer to the sensor are dropped', 'm', minimum=0.0, maximum=100.0,

@@ -1,6 +1,6 @@
-"""Evaluation, for those who installed ``sgor_ros[evaluation]``: one harness for all benchmarks.
+"""One harness: methods answer the pairs of a protocol, metrics judge, a report shows.
 
-`protocols` list pairs to register and the thresholds of success, `methods` are what is compared,
-`runner` runs them in turns and returns a row for each pair and method, `metrics` judge, `report`
-makes tables and pictures; `odometry` runs whole drives. `pairs` has the types that they share.
+Rooms, each above those that it uses: `metrics`, `methods`, `protocols` (which pairs, which
+thresholds), and `report`. Between: `front_end` makes the matches that methods share, `job` and
+`runner` run methods on pairs, `sequences` odometries on drives, `solver` times solvers.
 """

@@ -1,37 +1,44 @@
 """The paper's equations as plain dense numpy, slow and obvious: what the fast path must equal."""
+from typing import Any
+
 import numpy as np
+from numpy.typing import ArrayLike
+from numpy.typing import NDArray
+
+Array = NDArray[Any]
 
 
-def pair_gaps(source, target):
+def pair_gaps(source: Array, target: Array) -> Array:
     """Return d_ij for all pairs (Eq. 5), (N, N) metres."""
     p = np.linalg.norm(source[:, None] - source[None], axis=-1)
     q = np.linalg.norm(target[:, None] - target[None], axis=-1)
-    return np.abs(p - q)
+    return np.asarray(np.abs(p - q))
 
 
-def geometric_consistency(gaps, sigma_d, cutoff):
+def geometric_consistency(gaps: Array, sigma_d: float, cutoff: float) -> tuple[Array, Array]:
     """Return M' (Eq. 6) and W_m (Eq. 8), both (N, N)."""
     consistent = (gaps**2 / sigma_d**2 - 1 <= 0).astype(float)
     weights = np.exp(-gaps**2 / (2 * sigma_d**2)) * (gaps <= cutoff * sigma_d)
     return consistent, weights
 
 
-def semantic_consistency(source_labels, target_labels):
+def semantic_consistency(source_labels: ArrayLike, target_labels: ArrayLike) -> NDArray[np.bool_]:
     """Return whether (s_i^p, s_j^p) equals (s_i^q, s_j^q) (Eq. 9 and 10), (N, N)."""
     p, q = np.asarray(source_labels), np.asarray(target_labels)
-    return (p[:, None] == q[:, None]) & (p[None] == q[None])
+    return np.asarray((p[:, None] == q[:, None]) & (p[None] == q[None]))
 
 
-def group_matrix(group, consistent, weights, tight, loose):
+def group_matrix(group: NDArray[np.intp], consistent: Array, weights: Array,
+                 tight: NDArray[np.bool_], loose: NDArray[np.bool_]) -> Array:
     """Return M* of one group (Eq. 7, 11 and 12), (k, k)."""
     local_to_global = consistent[group]                                   # M'_g, (k, w)
     global_aware = (consistent[np.ix_(group, group)]
                     * (local_to_global @ weights @ local_to_global.T))    # M*_g
     semantic = tight[np.ix_(group, group)] | loose[np.ix_(group, group)]  # M_s*
-    return semantic * global_aware
+    return np.asarray(semantic * global_aware)
 
 
-def leading_eigenvector(matrix, rounds=10):
+def leading_eigenvector(matrix: Array, rounds: int = 10) -> Array:
     """Return the vector of `rounds` power iterations from ones, (N,)."""
     vector = np.ones(len(matrix))
     for _ in range(rounds):
@@ -40,7 +47,7 @@ def leading_eigenvector(matrix, rounds=10):
     return vector
 
 
-def weighted_svd(source, target, weights):
+def weighted_svd(source: Array, target: Array, weights: Array) -> Array:
     """Return T_target_source by weighted SVD (Eq. 14 and 15), (4, 4)."""
     w = weights / weights.sum()
     mean_p, mean_q = w @ source, w @ target
@@ -52,7 +59,7 @@ def weighted_svd(source, target, weights):
     return transform
 
 
-def truncated_distance(transform, source, target, sigma_d):
+def truncated_distance(transform: Array, source: Array, target: Array, sigma_d: float) -> float:
     """Return the mean TD (Eq. 18 and 19), metres."""
     total = 0.0
     for p, q in zip(source, target, strict=True):
@@ -66,12 +73,12 @@ def truncated_distance(transform, source, target, sigma_d):
     return total / len(source)
 
 
-def ground_angle(transform, source_normal, target_normal):
+def ground_angle(transform: Array, source_normal: Array, target_normal: Array) -> float:
     """Return the angle between R n_p and n_q, radians (Eq. 17)."""
-    return np.arccos(np.clip((transform[:3, :3] @ source_normal) @ target_normal, -1, 1))
+    return float(np.arccos(np.clip((transform[:3, :3] @ source_normal) @ target_normal, -1, 1)))
 
 
-def refine(transform, source, target, tau):
+def refine(transform: Array, source: Array, target: Array, tau: float) -> Array:
     """Return the SVD of all matches nearer than tau (Eq. 20), or the transform if under three."""
     moved = source @ transform[:3, :3].T + transform[:3, 3]
     near = np.linalg.norm(moved - target, axis=1) < tau
@@ -80,9 +87,10 @@ def refine(transform, source, target, tau):
     return weighted_svd(source[near], target[near], np.ones(near.sum()))
 
 
-def spread(points, order, count, spacing):
+def spread(points: Array, order: NDArray[np.intp], count: int, spacing: float) -> list[int]:
     """Return the strongest keys at least `spacing` apart, then the strongest of the others."""
-    taken, passed = [], []
+    taken: list[int] = []
+    passed: list[int] = []
     for i in order:
         near = any(np.linalg.norm(points[i] - points[t]) < spacing for t in taken)
         (passed if near else taken).append(i)
@@ -91,8 +99,9 @@ def spread(points, order, count, spacing):
     return (taken + passed)[:count]
 
 
-def solve(source, target, sigma_d, cutoff, groups, group_size, keep, tau, spacing=0.0,
-          labels=None, regional=None, normals=None, sigma_theta=np.pi):
+def solve(source: Array, target: Array, sigma_d: float, cutoff: float, groups: int,
+          group_size: int, keep: int, tau: float, spacing: float = 0.0, labels: Any = None,
+          regional: Any = None, normals: Any = None, sigma_theta: float = np.pi) -> Array | None:
     """Return T_target_source from matches by the dense path, None where no hypothesis passes.
 
     Labels are pairs: of the source, of the target; without them geometry alone counts.
@@ -122,7 +131,7 @@ def solve(source, target, sigma_d, cutoff, groups, group_size, keep, tau, spacin
     return refine(transforms[int(np.argmin(costs))], source, target, tau)
 
 
-def fit_plane(points):
+def fit_plane(points: Array) -> tuple[Array, float]:
     """Return (a, b, c) and d of the plane of points, the normal towards the origin (Eq. 16)."""
     mu = points.mean(axis=0)
     scatter = sum(np.outer(p - mu, p - mu) for p in points)
@@ -131,13 +140,14 @@ def fit_plane(points):
     return (normal, d) if d >= 0 else (-normal, -d)
 
 
-def plane_distance(plane, points):
+def plane_distance(plane: tuple[Array, float], points: Array) -> Array:
     """Return the left side of Eq. 3, the root of a^2 + b^2 + c^2 below the line, (N,) metres."""
     normal, d = plane
     return np.abs(points @ normal + d) / np.sqrt(normal @ normal)
 
 
-def ground(points, labels, ground_labels, sigma_g, narrow, others, other_labels):
+def ground(points: Array, labels: Array, ground_labels: Any, sigma_g: float, narrow: bool,
+           others: Array, other_labels: Array) -> tuple[Array, NDArray[np.bool_]]:
     """Return the ground normal of labelled points, and which of other points are ground.
 
     Eq. 2, SVD, Eq. 3, SVD; narrow: new ground points are among those of Eq. 2.
@@ -150,21 +160,22 @@ def ground(points, labels, ground_labels, sigma_g, narrow, others, other_labels)
     return fit_plane(points[near])[0], others_near
 
 
-def overlap(source_labels, target_labels, ground_labels):
+def overlap(source_labels: Any, target_labels: Any, ground_labels: Any
+            ) -> list[NDArray[np.bool_]]:
     """Return which points have a label of both scans that is not of the ground (Eq. 4)."""
     common = (set(source_labels) & set(target_labels)) - set(ground_labels)
     return [np.array([s in common for s in labels]) for labels in (source_labels, target_labels)]
 
 
-def regional_labels(points, votes, radius):
+def regional_labels(points: Array, votes: NDArray[Any], radius: float) -> NDArray[Any]:
     """Return the label with most votes within a radius; points have a vote a label, (N, C)."""
     distance = np.linalg.norm(points[:, None] - points[None], axis=-1)
     return np.array([votes[row <= radius].sum(axis=0).argmax() for row in distance])
 
 
-def voxels(points, labels, size):
+def voxels(points: Array, labels: NDArray[Any], size: float) -> tuple[Array, NDArray[Any]]:
     """Return mean points and votes (V, 256) of all cells, in order of their first points."""
-    cells = {}
+    cells: dict[Any, Any] = {}
     for cell, point, label in zip(map(tuple, np.floor(points / size)), points, labels,
                                   strict=True):
         cells.setdefault(cell, []).append((point, label))
@@ -174,6 +185,6 @@ def voxels(points, labels, size):
     return means, votes
 
 
-def nearest(source, target):
+def nearest(source: Array, target: Array) -> NDArray[Any]:
     """Return for each descriptor of the source the nearest of the target, (N,)."""
     return np.array([np.linalg.norm(target - row, axis=1).argmin() for row in source])

@@ -8,22 +8,21 @@ from scipy.spatial import cKDTree
 
 from sgor_ros.commands.benchmark import main
 from sgor_ros.core.config import SgorConfig
-from sgor_ros.evaluation.methods import Estimate
+from sgor_ros.evaluation import solver
+from sgor_ros.evaluation.job import turned
+from sgor_ros.evaluation.memory import peak_memory_mb
+from sgor_ros.evaluation.methods import Answer
 from sgor_ros.evaluation.methods import Method
-from sgor_ros.evaluation.methods.sgor import on_scans
-from sgor_ros.evaluation.metrics import NEES_BOUND
-from sgor_ros.evaluation.pairs import selection
-from sgor_ros.evaluation.pairs.front_end import random_labels
-from sgor_ros.evaluation.pairs.front_end import scans_of
-from sgor_ros.evaluation.pairs.pair import Pair
-from sgor_ros.evaluation.protocols import solver
+from sgor_ros.evaluation.methods import sgor
+from sgor_ros.evaluation.methods.sgor import random_labels
+from sgor_ros.evaluation.metrics.pose_error import NEES_BOUND
+from sgor_ros.evaluation.metrics.registration_recall import at_threshold
+from sgor_ros.evaluation.metrics.row import Row
+from sgor_ros.evaluation.protocols import pairs as pairing
 from sgor_ros.evaluation.protocols.ablation import PAPER_ROWS
-from sgor_ros.evaluation.protocols.protocol import Protocol
-from sgor_ros.evaluation.report import cells
-from sgor_ros.evaluation.report import pair_tables
-from sgor_ros.evaluation.rows import Row
-from sgor_ros.evaluation.runner import peak_memory_mb
-from sgor_ros.evaluation.runner import run
+from sgor_ros.evaluation.protocols.pairs import Pair
+from sgor_ros.evaluation.report import tables
+from sgor_ros.evaluation.runner import run_pairs
 from sgor_ros.io.datasets import Drive
 from sgor_ros.io.datasets import DriveScan
 from sgor_ros.io.datasets import open_drives
@@ -63,10 +62,10 @@ def rows_of(folder):
 
 
 def row(score=0.9, right=True, within=True, valid=True, distance=5.0, **changes):
-    values = {'method': 'm', 'pair': 's t', 'group': 'd', 'source': 's', 'target': 't',
-              'same_place': right, 'distance_m': distance, 'rotation_error_deg': 0.1,
-              'translation_error_m': 0.02 if within else 9.0, 'accepted': valid, 'score': score,
-              'seconds': 0.1, 'seconds_one_new': 0.05}
+    values = {'method': 'm', 'data_set': 'd', 'source': 's', 'target': 't', 'right': right,
+              'distance_m': distance, 'rotation_error_deg': 0.1, 'translation_error_m': 0.02,
+              'within': within, 'valid': valid, 'score': score, 'seconds': 0.1,
+              'seconds_one_new': 0.05}
     return Row(**{**values, **changes})
 
 
@@ -88,12 +87,12 @@ def test_drives_of_a_user_have_poses_of_the_sensor(sequences_folder, street):
 
 def test_near_pairs_are_those_within_reach(sequences_folder, street):
     drive = open_drives(sequences_folder / 'sequences')[0]
-    pairs = selection.near_pairs([drive], 2.0)    # scans are 1.5 m apart
+    pairs = pairing.near_pairs([drive], 2.0)    # scans are 1.5 m apart
     assert [(p.source.name[-1], p.target.name[-1]) for p in pairs] == [
         ('1', '0'), ('2', '1'), ('3', '2')]
     truth = np.linalg.inv(street[1][2]) @ street[2][2]
     assert np.allclose(pairs[1].T_target_source, truth, atol=1e-6)
-    assert len(selection.near_pairs([drive], 36.0)) == 6
+    assert len(pairing.near_pairs([drive], 36.0)) == 6
 
 
 def test_a_drive_may_be_the_folder_itself(sequences_folder):
@@ -110,8 +109,8 @@ def test_real_drives_and_pairs_lie_on_each_other(data_folder):
     assert conventions['kitti/08'] == {'semantickitti'}
     assert conventions['kitti/00'] == {'semantickitti', 'semantickitti_train'}
     assert not drives['nuscenes'].heights_known
-    near = selection.near_pairs([drives['kitti/08']], 36.0)
-    listed = selection.listed_pairs(data_folder, 36.0)
+    near = pairing.near_pairs([drives['kitti/08']], 36.0)
+    listed = pairing.listed_pairs(data_folder, 36.0)
     assert len(near) == 45
     entries = [entry for entry in json.loads((data_folder / 'pairs.json').read_text())
                if 'kitti/08' not in entry['source']]
@@ -124,16 +123,16 @@ def test_real_drives_and_pairs_lie_on_each_other(data_folder):
 
 def test_choose_takes_evenly_from_the_data_sets():
     pairs = [Pair(frame(name), frame(name), np.eye(4)) for name in 'aaaaaaaabbb']
-    chosen = selection.choose(pairs, 6, seed=0)
-    assert [pair.group for pair in chosen] == ['a', 'b'] * 3
+    chosen = pairing.choose(pairs, 6, seed=0)
+    assert [pair.data_set for pair in chosen] == ['a', 'b'] * 3
     assert len(set(map(id, chosen))) == 6
-    assert chosen != selection.choose(pairs, 6, seed=1)
-    assert len(selection.choose(pairs, 100, seed=0)) == 11
+    assert chosen != pairing.choose(pairs, 6, seed=1)
+    assert len(pairing.choose(pairs, 100, seed=0)) == 11
 
 
 def test_choose_takes_evenly_from_near_and_far():
     pairs = [Pair(frame('a'), frame('a'), apart(x)) for x in (1, 2, 3, 4, 5, 6, 7, 8, 25, 31)]
-    assert sorted(p.distance_m // 10 for p in selection.choose(pairs, 4, seed=0)) == [0, 0, 2, 3]
+    assert sorted(p.distance_m // 10 for p in pairing.choose(pairs, 4, seed=0)) == [0, 0, 2, 3]
 
 
 def apart(x):
@@ -151,23 +150,23 @@ def test_wrong_pairs_are_of_different_places():
     poses[:, 0, 3] = (0, 50, 99, 120)
     long = Drive('long', [frame('k', f'long{i}') for i in range(4)], poses)
     short = Drive('short', [frame('n', f'short{i}') for i in range(3)], None)
-    pairs = selection.different_places([long, short], 100, seed=0)
-    assert not any(pair.same_place for pair in pairs)
+    pairs = pairing.wrong_pairs([long, short], 100, seed=0)
+    assert not any(pair.right for pair in pairs)
     names = {(pair.source.name, pair.target.name) for pair in pairs}
     across = {(f'long{i}', f'short{j}') for i in range(4) for j in range(3)}
     assert names == across | {('long3', 'long0')}
-    assert len(selection.different_places([long, short], 5, seed=0)) == 5
+    assert len(pairing.wrong_pairs([long, short], 5, seed=0)) == 5
 
 
 def test_the_truth_of_a_turned_pair_maps_the_same_points(sequences_folder):
-    pair = selection.near_pairs(open_drives(sequences_folder), 36.0)[2]
-    sample, truth = scans_of(pair, 3)
+    pair = pairing.near_pairs(open_drives(sequences_folder), 36.0)[2]
+    sample, truth = turned(pair, seed=3)
     scan = pair.source.read().points.astype(float)
     before = scan @ pair.T_target_source[:3, :3].T + pair.T_target_source[:3, 3]
     after = sample.source.points.astype(float) @ truth[:3, :3].T + truth[:3, 3]
     assert np.allclose(before, after, atol=1e-3)
     assert np.linalg.norm(scan - sample.source.points, axis=1).max() > 5
-    again, _ = scans_of(pair, 3)
+    again, _ = turned(pair, seed=3)
     assert np.array_equal(again.source.points, sample.source.points)
 
 
@@ -181,12 +180,12 @@ def test_random_labels_replace_the_share_that_was_asked_for():
 
 @pytest.mark.parametrize('heights_known', [True, False])
 def test_heights_count_only_where_they_are_known(sequences_folder, heights_known):
-    pair = selection.near_pairs(open_drives(sequences_folder), 36.0)[0]
+    pair = pairing.near_pairs(open_drives(sequences_folder), 36.0)[0]
     pair = Pair(pair.source, pair.target, pair.T_target_source, heights_known=heights_known)
-    too_high = scans_of(pair, 0)[1]
+    too_high = turned(pair, seed=0)[1]
     too_high[2, 3] += 1.0
-    method = Method('m', lambda scans: Estimate(too_high, score=1.0), 'scans')
-    found, = run(Protocol.turned([pair], 0), [method])
+    method = Method('m', lambda sample: Answer(too_high, score=1.0))
+    found, = run_pairs([pair], [method], seed=0)
     assert found.success is not heights_known
     assert found.false_accept is heights_known
     assert found.translation_error_m == pytest.approx(1.0 if heights_known else 0.0, abs=1e-9)
@@ -195,23 +194,23 @@ def test_heights_count_only_where_they_are_known(sequences_folder, heights_known
 
 def test_recall_counts_neither_refused_nor_wrong_answers():
     rows = [row(), row(valid=False), row(within=False), row()]
-    assert cells.recall(rows) == '50.0 % (2/4)'
+    assert tables.recall(rows) == '50.0 % (2/4)'
     rows[0] = row(rotation_error_deg=0.3, translation_error_m=0.04)
-    assert cells.errors(rows) == ('0.20 / 0.20', '3.0 / 3.0')
-    assert cells.recall(cells.in_band([row(distance=10.0), row(distance=9.9)], 0, 10)
+    assert tables.errors(rows) == ('0.20 / 0.20', '3.0 / 3.0')
+    assert tables.recall(tables.in_band([row(distance=10.0), row(distance=9.9)], 0, 10)
                          ) == '100.0 % (1/1)'
 
 
 def test_times_of_few_runs_are_marked():
-    assert cells.times([0.1, 0.2, 0.3]) == '200 / 290 (only 3)'
-    assert cells.times(np.arange(1, 22) / 1000) == '11 / 20'
-    assert cells.times([float('nan')]) == '-'
+    assert tables.times([0.1, 0.2, 0.3]) == '200 / 290 (only 3)'
+    assert tables.times(np.arange(1, 22) / 1000) == '11 / 20'
+    assert tables.times([float('nan')]) == '-'
 
 
 def test_the_table_tells_false_accepts_apart():
     rows = [row(), row(within=False), row(right=False, within=False),
             row(right=False, within=False, valid=False)]
-    line = pair_tables.pairs_table(rows, ['m'], {'m': 321.4}).splitlines()[-1]
+    line = tables.pairs_table(rows, ['m'], {'m': 321.4}).splitlines()[-1]
     cells = [cell.strip() for cell in line.strip('|').split('|')]
     assert cells[0] == 'm'
     assert cells[1] == '50.0 % (1/2)'
@@ -221,7 +220,7 @@ def test_the_table_tells_false_accepts_apart():
 def test_thresholds_refuse_below_and_accept_from_there_on():
     rows = [row(0.5), row(0.9), row(0.7, distance=25.0), row(0.7, within=False),
             row(0.8, right=False, within=False), row(0.2, right=False, within=False)]
-    refused, near, bad, wrong = pair_tables.at_threshold(rows, 0.8)
+    refused, near, bad, wrong = at_threshold(rows, 0.8)
     assert refused.tolist() == [True, False, True]
     assert near.tolist() == [True, False]
     assert bad.tolist() == [False]
@@ -229,19 +228,18 @@ def test_thresholds_refuse_below_and_accept_from_there_on():
 
 
 def test_sgor_refused_for_few_inliers_passes_no_threshold(sequences_folder):
-    pair = selection.near_pairs(open_drives(sequences_folder), 36.0)[0]
-    sample, _ = scans_of(pair, 0)
-    answer = on_scans('m', SgorConfig(min_inliers=10000)).run(sample)
-    assert not answer.accepted
+    pair = pairing.near_pairs(open_drives(sequences_folder), 36.0)[0]
+    sample, _ = turned(pair, seed=0)
+    answer = sgor('m', SgorConfig(min_inliers=10000)).on_scans(sample)
+    assert not answer.valid
     assert answer.score == 0.0
-    assert on_scans('m', SgorConfig()).run(sample).score > 0.9
+    assert sgor('m', SgorConfig()).on_scans(sample).score > 0.9
 
 
 def test_made_up_matches_hold_the_share_of_right_ones():
-    matches = solver.made_up(2000, 0.1, seed=0)
-    T = matches.T_target_source
-    moved = matches.matches.source @ T[:3, :3].T + T[:3, 3]
-    residuals = np.linalg.norm(moved - matches.matches.target, axis=1)
+    pair = solver.made_up(2000, 0.1, seed=0)
+    T, matches = pair.T_target_source, pair.matches
+    residuals = np.linalg.norm(matches.source @ T[:3, :3].T + T[:3, 3] - matches.target, axis=1)
     assert np.sum(residuals < 0.6) == pytest.approx(200, abs=3)
 
 
@@ -277,17 +275,17 @@ def test_pairs_command(sequences_folder, tmp_path, capsys):
 
 
 def test_peak_memory_is_of_each_method_alone(sequences_folder, tmp_path):
-    pair = selection.near_pairs(open_drives(sequences_folder), 36.0)[0]
-    sample, _ = scans_of(pair, 0)
+    pair = pairing.near_pairs(open_drives(sequences_folder), 36.0)[0]
+    sample, _ = turned(pair, seed=0)
     ballast = np.ones(60_000_000)    # 480 MB here, none of them there
-    memory = peak_memory_mb([Method('big', _allocate, 'scans')], sample)
+    memory = peak_memory_mb([Method('big', _allocate)], sample)
     assert 30 < memory[''] < 450
     assert memory['big'] - memory[''] == pytest.approx(200, abs=40)
     assert ballast.any()
 
 
 def _allocate(sample):
-    return Estimate(None, score=float(np.ones(25_000_000).sum()))    # 200 MB
+    return Answer(None, score=float(np.ones(25_000_000).sum()))    # 200 MB
 
 
 def test_wrong_command(sequences_folder, tmp_path):

@@ -11,7 +11,7 @@ from sgor_ros.commands.demo import forth_and_back
 from sgor_ros.commands.world_bag import write_world_bag
 from sgor_ros.core.common import se3
 from sgor_ros.core.common.settings import InputError
-from sgor_ros.evaluation.metrics.trajectory import trajectory_errors
+from sgor_ros.evaluation.metrics.trajectory import track_errors
 from sgor_ros.io.bags import BagReader
 from sgor_ros.world import simulate
 
@@ -96,7 +96,7 @@ def test_track_is_laid_on_the_truth_at_its_first_pose():
     steps = np.array([se3.compose(np.eye(3), np.array([x, 0, 0])) for x in (0.0, 4, 10)])
     wrong = steps.copy()
     wrong[2, 1, 3] = 0.3
-    errors = trajectory_errors(wrong, start @ steps, (10.0,))
+    errors = track_errors(wrong, start @ steps, (10.0,))
     assert errors.length_m == pytest.approx(10)
     assert errors.translation_m == pytest.approx([0, 0.3])
     assert errors.end_translation_m == pytest.approx(0.3)

@@ -11,9 +11,9 @@ from sgor_ros import register
 from sgor_ros import SemanticScan
 from sgor_ros import SgorConfig
 from sgor_ros import Status
+from sgor_ros.commands.scene_pairs import scene_drive
 from sgor_ros.core.common import se3
 from sgor_ros.core.prediction_check import check_prediction
-from sgor_ros.evaluation.protocols.scenes import scene_drive
 
 CONFIG = SgorConfig()
 

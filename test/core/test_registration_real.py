@@ -8,9 +8,9 @@ from sgor_ros import preprocess
 from sgor_ros import register
 from sgor_ros import register_correspondences
 from sgor_ros import SgorConfig
-from sgor_ros.evaluation.metrics import inlier_scores
-from sgor_ros.evaluation.metrics import rotation_error_deg
-from sgor_ros.evaluation.metrics import translation_error_m
+from sgor_ros.evaluation.metrics.inliers import inlier_scores
+from sgor_ros.evaluation.metrics.pose_error import rotation_error_deg
+from sgor_ros.evaluation.metrics.pose_error import translation_error_m
 from sgor_ros.io.datasets import open_drives
 from sgor_ros.io.scans import read_scan
 

@@ -2,6 +2,8 @@
 from dataclasses import replace
 import itertools
 import multiprocessing
+import os
+from pathlib import Path
 import signal
 import subprocess
 import sys
@@ -13,17 +15,17 @@ import pytest
 
 from sgor_ros import InputError
 from sgor_ros.core.common import se3
-from sgor_ros.evaluation import rows as table
-from sgor_ros.evaluation.methods import Estimate
+from sgor_ros.evaluation import front_end
+from sgor_ros.evaluation.methods import Answer
 from sgor_ros.evaluation.methods import Matches
 from sgor_ros.evaluation.methods import Method
-from sgor_ros.evaluation.metrics import kept_scores
-from sgor_ros.evaluation.metrics.registration import EASY
-from sgor_ros.evaluation.pairs import front_end
-from sgor_ros.evaluation.pairs.selection import drive_of
-from sgor_ros.evaluation.pairs.truth import refined
+from sgor_ros.evaluation.metrics import row as table
+from sgor_ros.evaluation.metrics.inliers import kept_scores
+from sgor_ros.evaluation.metrics.registration_recall import EASY
+from sgor_ros.evaluation.metrics.row import Row
 from sgor_ros.evaluation.protocols import studies
-from sgor_ros.evaluation.protocols.given import given_matches
+from sgor_ros.evaluation.protocols.drives import posed
+from sgor_ros.evaluation.protocols.drives import strided
 from sgor_ros.evaluation.protocols.indoor import cloud_of_depth
 from sgor_ros.evaluation.protocols.indoor import depth_frames
 from sgor_ros.evaluation.protocols.indoor import threedmatch
@@ -32,14 +34,18 @@ from sgor_ros.evaluation.protocols.kitti import kitti_10m_list
 from sgor_ros.evaluation.protocols.kitti import kitti_loops
 from sgor_ros.evaluation.protocols.kitti import read_pair_list
 from sgor_ros.evaluation.protocols.kitti import ten_metre_pairs
-from sgor_ros.evaluation.protocols.posed import posed
-from sgor_ros.evaluation.protocols.posed import strided
-from sgor_ros.evaluation.report.cells import latex
+from sgor_ros.evaluation.protocols.match_files import given_matches
+from sgor_ros.evaluation.protocols.pairs import drive_of
+from sgor_ros.evaluation.protocols.truth import refined
+from sgor_ros.evaluation.report.protocol_tables import latex
 from sgor_ros.evaluation.report.protocol_tables import main_rows
 from sgor_ros.evaluation.report.protocol_tables import whole
 from sgor_ros.evaluation.runner import run
 from sgor_ros.world import Lidar
 from sgor_ros.world import simulate
+
+DATA = Path(os.environ.get('SGOR_DATA', Path(__file__).resolve().parents[3] / 'shared/data'))
+needs_data = pytest.mark.skipif(not DATA.is_dir(), reason='no shared data')
 
 
 @pytest.fixture(scope='module')
@@ -51,7 +57,7 @@ def drive():
 def centroid(matches):
     """Stand in for a method that is quick and the same everywhere: shift by the median."""
     shift = np.median(matches.target - matches.source, axis=0)
-    return Estimate(se3.compose(np.eye(3), shift), np.arange(0, len(matches.source), 2))
+    return Answer(se3.compose(np.eye(3), shift), np.arange(0, len(matches.source), 2))
 
 
 def tired(matches):
@@ -82,8 +88,9 @@ def test_ten_metre_rule_by_hand():
     assert ten_metre_pairs(standing)[0] == (55, 153)
 
 
-def test_lists_and_rule_of_kitti(data_folder):
-    lists = data_folder / 'pair_lists'
+@needs_data
+def test_lists_and_rule_of_kitti():
+    lists = DATA / 'pair_lists'
     rows = read_pair_list(lists / 'kitti_10m.txt')
     assert len(rows) == 556
     assert [sum(row[0] == s for row in rows) for s in (8, 9, 10)] == [307, 162, 87]
@@ -97,9 +104,10 @@ def test_lists_and_rule_of_kitti(data_folder):
     assert sizes == [914, 1151, 1260]
 
 
-def test_listed_truth_maps_source_into_target(data_folder):
+@needs_data
+def test_listed_truth_maps_source_into_target():
     """Of the first row of the loops whose scans would be here, by the poses of the sequence."""
-    path = data_folder / 'pair_lists/kitti_loops_0_10.txt'
+    path = DATA / 'pair_lists/kitti_loops_0_10.txt'
     for _, _, _, _, T in read_pair_list(path)[:50]:
         assert np.linalg.norm(T[:3, 3]) < 10.5
         assert np.linalg.det(T[:3, :3]) == pytest.approx(1, abs=1e-3)
@@ -147,24 +155,24 @@ def test_kept_scores_by_hand():
 
 def test_a_killed_run_goes_on_to_the_same_table(tmp_path, drive):
     protocol = strided([drive], [1, 2])
-    whole_run = run(protocol, [Method('m', centroid)], tmp_path / 'whole')
+    whole_run = run(protocol, [Method('m', on_matches=centroid)], tmp_path / 'whole')
     tired.done = 0
     with pytest.raises(KeyboardInterrupt):
-        run(protocol, [Method('m', tired)], tmp_path / 'killed')
+        run(protocol, [Method('m', on_matches=tired)], tmp_path / 'killed')
     # and the last line cut off
     path = tmp_path / 'killed/pairs.csv'
     path.write_text(path.read_text() + 'm,,street 4')
-    resumed = run(protocol, [Method('m', centroid)], tmp_path / 'killed')
+    resumed = run(protocol, [Method('m', on_matches=centroid)], tmp_path / 'killed')
     assert text_of(resumed) == text_of(whole_run)
     assert len(path.read_text().splitlines()) == 1 + len(protocol.pairs)
     # nothing is run again
-    assert run(protocol, [Method('m', None)], tmp_path / 'killed') == resumed
+    assert run(protocol, [Method('m', on_matches=None)], tmp_path / 'killed') == resumed
 
 
 def test_processes_and_dask_give_the_same_table(tmp_path, drive):
     from distributed import LocalCluster
     protocol = strided([drive], [1])
-    entries = [Method('m', centroid)]
+    entries = [Method('m', on_matches=centroid)]
     one = run(protocol, entries, tmp_path / '1')
     assert text_of(run(protocol, entries, tmp_path / '2', processes=2)) == text_of(one)
     with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
@@ -175,16 +183,18 @@ def test_processes_and_dask_give_the_same_table(tmp_path, drive):
 
 
 def test_another_protocol_does_not_go_into_the_same_folder(tmp_path, drive):
-    run(strided([drive], [1]), [Method('m', centroid)], tmp_path)
+    run(strided([drive], [1]), [Method('m', on_matches=centroid)], tmp_path)
     with pytest.raises(InputError, match='holds a run with other settings'):
-        run(posed([drive], 5.0), [Method('m', centroid)], tmp_path)
+        run(posed([drive], 5.0), [Method('m', on_matches=centroid)], tmp_path)
 
 
 def test_main_table_by_hand(drive):
     """Of two answers one is right: RR 50, means of RE and TE over that one, of IP over both."""
-    def row(name, te, precision):
-        return table.Row('m', name, 'g', 1.0, te, 0.02, matches=100, inlier_share=0.1,
-                         precision=precision, recall=0.5, f1=0.4)
+    def row(pair, te, precision):
+        return Row(method='m', pair=pair, group='g', rotation_error_deg=1.0,
+                   translation_error_m=te,
+                   within=te < 0.6, precision=precision, recall=0.5, f1=0.4, matches=100,
+                   right_share=0.1, seconds=0.02)
     protocol = strided([drive], [1])
     header, rows = main_rows([row('a', 0.1, 0.8), row('b', 3.0, 0.2)], protocol, EASY)
     assert dict(zip(header, rows[0], strict=True)) == {
@@ -208,7 +218,7 @@ def test_studies_change_what_they_say(drive):
     config = posed([drive], 5.0).front_end.replace(max_correspondences=500, voxel_size=0.5)
 
     def made(**change):
-        return front_end.shared_matches(pair, config, 0.6, front_end.Variant(**change))
+        return front_end.shared_matches(pair, config, 0.6, studies.Variant(**change))
     whole_set, few = made(), made(matches=100)
     assert len(few.source) == 100
     given = {tuple(row) for row in np.hstack((whole_set.source, whole_set.target))}
@@ -235,7 +245,7 @@ def test_features_from_files(tmp_path, drive):
         path.parent.mkdir(parents=True, exist_ok=True)
         np.savez(path, points=se3.transform(T, places), descriptors=described)
     config = strided([drive], [1]).front_end.replace(semantics='none', secondary_ground=False)
-    found = front_end.shared_matches(pair, config, 0.6, front_end.Variant(),
+    found = front_end.shared_matches(pair, config, 0.6, studies.Variant(),
                                      front_end.Features(tmp_path))
     moved = se3.transform(pair.T_target_source, found.source)
     right = np.linalg.norm(moved - found.target, axis=1) < 1e-6
@@ -270,32 +280,35 @@ def test_depth_map_by_hand(tmp_path):
     assert scan.labels.tolist() == [9, 9]
 
 
+@needs_data
 @pytest.mark.parametrize(('names', 'inlier', 'count'), [('kitti_*', 0.6, 3), ('3d*', 0.1, 1)])
-def test_matches_from_files(tmp_path, names, inlier, count, data_folder):
+def test_matches_from_files(tmp_path, names, inlier, count):
     """The shared sets, thinned by a study too."""
-    protocol = given_matches(data_folder / 'correspondences', names, inlier)
-    found = run(protocol, [Method('m', centroid)], tmp_path,
-                variants=[front_end.Variant('all'), front_end.Variant('9', matches=9)])
+    protocol = given_matches(DATA / 'correspondences', names, inlier)
+    found = run(protocol, [Method('m', on_matches=centroid)], tmp_path,
+                variants=[studies.Variant('all'), studies.Variant('9', matches=9)])
     assert len(found) == 2 * count
-    assert all(r.matches > 4000 and r.inlier_share > 0.008 for r in found[:count])
+    assert all(r.matches > 4000 and r.right_share > 0.008 for r in found[:count])
     assert {r.matches for r in found[count:]} == {9}
 
 
-def test_3dmatch_runs_to_its_end(tmp_path, data_folder):
+@needs_data
+def test_3dmatch_runs_to_its_end(tmp_path):
     """The pair that is here, with the truth of its log, by SC2-PCR."""
     from sgor_ros.evaluation.methods.sc2_pcr import sc2_pcr
-    protocol = threedmatch(data_folder / 'indoor')
+    protocol = threedmatch(DATA / 'indoor')
     pair, = protocol.pairs
     assert (pair.name, pair.group) == ('7-scenes-redkitchen 4 0', '7-scenes-redkitchen')
     assert protocol.missing > 100
-    found, = run(protocol, [Method('SC2-PCR', sc2_pcr)], tmp_path)
-    assert found.within(protocol.thresholds[0])
+    found, = run(protocol, [Method('SC2-PCR', on_matches=sc2_pcr)], tmp_path)
+    assert found.within
 
 
-def test_refined_truth_is_kept(tmp_path, data_folder):
+@needs_data
+def test_refined_truth_is_kept(tmp_path):
     """ICP of real scans from poses that are 5 cm off; the second time nothing is read."""
     from sgor_ros.io.datasets import open_drives
-    drive, = open_drives(data_folder / 'kitti/08')
+    drive, = open_drives(DATA / 'kitti/08')
     T = drive.T_world_sensor
     pair = strided([replace(drive, T_world_sensor=T[:len(drive.scans)])], [3]).pairs[0]
     off = replace(pair, T_target_source=se3.compose(np.eye(3), np.array([0.05, 0.05, 0.0]))
@@ -313,10 +326,10 @@ import numpy as np
 
 
 def shift(matches):
-    from sgor_ros.evaluation.methods import Estimate
+    from sgor_ros.evaluation.methods import Solution
     T = np.eye(4)
     T[:3, 3] = np.median(matches.target - matches.source, axis=0)
-    return Estimate(T)
+    return Solution(T)
 """
 
 
@@ -360,5 +373,5 @@ def test_what_the_command_refuses(tmp_path, arguments, says):
 
 def test_matches_can_be_sent_to_another_process():
     with multiprocessing.get_context('spawn').Pool(1) as pool:
-        solution, = pool.map(centroid, [Matches.of(np.zeros((4, 3)), np.ones((4, 3)), 0.6)])
-    assert solution.T_target_source[:3, 3] == pytest.approx([1, 1, 1])
+        answer, = pool.map(centroid, [Matches.of(np.zeros((4, 3)), np.ones((4, 3)), 0.6)])
+    assert answer.T_target_source[:3, 3] == pytest.approx([1, 1, 1])

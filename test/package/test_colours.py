@@ -21,7 +21,7 @@ APART = 10
 
 TOGETHER = {
     'clouds and matches': (colours.TARGET, colours.SOURCE, colours.INLIER, colours.REJECTED),
-    'answers': (colours.RIGHT, colours.WRONG, colours.DIFFERENT_PLACES),
+    'answers': (colours.RIGHT, colours.WRONG, colours.DIFFERENT),
     'track': (colours.TRUTH, colours.ESTIMATE, colours.LIMIT, colours.SURE),
     'curves': tuple(colour for colour, _, _ in colours.SERIES),
     'things on a map': (colours.ESTIMATE, colours.TRUTH, *(

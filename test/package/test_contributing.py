@@ -87,13 +87,12 @@ print(source.features.descriptors.shape[1], found.status,
     assert float(metres) < 0.3
 
 
-def test_a_method_is_among_the_rivals(copy):
+def test_a_method_is_among_those_of_the_tables(copy):
     told = run(copy, '-c', """
 import numpy as np
-from sgor_ros.evaluation.methods import imported, Matches, rivals_on_matches
+from sgor_ros.evaluation.methods import available, Matches, ON_MATCHES
 points = np.random.default_rng(0).uniform(-9, 9, (50, 3))
-matches = Matches.of(points, points + (1, 2, 3), 0.6)
-for method in (rivals_on_matches(lambda text: None)['median shift'],
-               imported('sgor_ros.evaluation.methods.median_shift:median_shift')):
-    print(*method.run(matches).T_target_source[:3, 3].round(6))""")
-    assert [float(each) for each in told.split()] == 2 * [1, 2, 3]
+method = available(ON_MATCHES, lambda text: None)['median shift']
+answer = method.on_matches(Matches.of(points, points + (1, 2, 3), 0.6))
+print(*answer.T_target_source[:3, 3].round(6))""")
+    assert [float(each) for each in told.split()] == [1, 2, 3]

@@ -3,12 +3,11 @@ from argparse import ArgumentParser
 from argparse import Namespace
 from pathlib import Path
 
-from ...evaluation import runner
-from ...evaluation.protocols import ablation
-from ...evaluation.protocols.protocol import Protocol
-from ...evaluation.report import pair_tables
+from ...evaluation.metrics.row import scan_records
+from ...evaluation.protocols import ablation as ablations
 from ...evaluation.report import plots
-from ...evaluation.rows import records
+from ...evaluation.report import tables
+from ...evaluation.runner import run_pairs
 from . import inputs
 from .numbers import positive
 
@@ -26,15 +25,15 @@ def add_options(command: ArgumentParser) -> None:
 
 def measure(arguments: Namespace, folder: Path) -> None:
     """Turn the mechanisms off, one at a time, as the paper does and ours too."""
-    methods = ablation.methods(arguments.cores, only_paper=arguments.paper)
+    methods = ablations.methods(arguments.cores, only_paper=arguments.paper)
     right = inputs.right_pairs(arguments, inputs.drives_of(arguments), arguments.pairs)
-    rows = runner.run(Protocol.turned(right, arguments.seed), methods, warm_up=True)
+    rows = run_pairs(right, methods, arguments.seed)
     names = [method.name for method in methods]
-    counts = {data_set: sum(pair.group == data_set for pair in right)
-              for data_set in sorted({pair.group for pair in right})}
-    text = (f'{pair_tables.ablation_table(rows, names)}\n\n{pair_tables.paper_table(rows)}\n\n'
+    counts = {data_set: sum(pair.data_set == data_set for pair in right)
+              for data_set in sorted({pair.data_set for pair in right})}
+    text = (f'{tables.ablation_table(rows, names)}\n\n{tables.paper_table(rows)}\n\n'
             f'{len(right)} pairs ('
             + ', '.join(f'{count} {name}' for name, count in counts.items())
-            + f'); the paper: 555 of KITTI, 9.5 m apart. {pair_tables.RULE}')
-    inputs.finish(arguments, folder, text, records(rows), len(right))
+            + f'); the paper: 555 of KITTI, 9.5 m apart. {tables.RULE}')
+    inputs.finish(arguments, folder, text, scan_records(rows), len(right))
     plots.plot_ablation(folder / 'plot.png', rows, names)

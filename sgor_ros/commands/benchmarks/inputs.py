@@ -9,9 +9,9 @@ from typing import Any
 
 from ...core.common.settings import InputError
 from ...core.config import SgorConfig
-from ...evaluation.pairs import selection
-from ...evaluation.pairs.pair import Pair
-from ...evaluation.report import files
+from ...evaluation.output import save
+from ...evaluation.protocols import pairs as pairing
+from ...evaluation.protocols.pairs import Pair
 from ...io.datasets import Drive
 from ...io.datasets import open_drives
 
@@ -67,26 +67,26 @@ def world_drive(seed: int, scans: int, speed: float) -> Drive:
         raise InputError(f'the built-in world needs Open3D ({error}): pip install open3d'
                          ) from error
     say(f'building the world, seed {seed}')
-    return selection.drive_of(f'world/{seed}', (scan[1:] for scan in
+    return pairing.drive_of(f'world/{seed}', (scan[1:] for scan in
                                               simulate(scans, seed, speed=speed)))
 
 
 def right_pairs(arguments: Namespace, drives: Sequence[Drive], count: int) -> list[Pair]:
     """Choose pairs of the same place."""
-    candidates = selection.near_pairs(drives, arguments.max_distance)
+    candidates = pairing.near_pairs(drives, arguments.max_distance)
     if arguments.data:
-        candidates += selection.listed_pairs(arguments.data, arguments.max_distance)
+        candidates += pairing.listed_pairs(arguments.data, arguments.max_distance)
     if not candidates:
         raise InputError(f'{arguments.data or "world"}: no pairs within '
                          f'{arguments.max_distance:g} m; they need poses.txt or pairs.json')
-    return selection.choose(candidates, count, arguments.seed)
+    return pairing.choose(candidates, count, arguments.seed)
 
 
 def finish(arguments: Namespace, folder: Path, text: str, records: list[dict[str, Any]],
            right: int = 0, wrong: int = 0) -> None:
     """Print the table and write it with its rows and what it was made with."""
     print(text)
-    files.save(folder, text, records, {
+    save(folder, text, records, {
         'options': vars(arguments), 'right_pairs': right, 'wrong_pairs': wrong,
         'config': asdict(default_config(arguments))})
 

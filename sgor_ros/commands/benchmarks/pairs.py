@@ -4,16 +4,17 @@ from argparse import Namespace
 from pathlib import Path
 
 from ...core.common.settings import InputError
-from ...evaluation import runner
+from ...evaluation.job import turned
+from ...evaluation.memory import peak_memory_mb
+from ...evaluation.methods import available
 from ...evaluation.methods import Method
-from ...evaluation.methods import rivals_on_scans
-from ...evaluation.methods.sgor import on_scans
-from ...evaluation.pairs import selection
-from ...evaluation.pairs.front_end import scans_of
-from ...evaluation.protocols.protocol import Protocol
-from ...evaluation.report import pair_tables
+from ...evaluation.methods import ON_SCANS
+from ...evaluation.methods import sgor
+from ...evaluation.metrics.row import scan_records
+from ...evaluation.protocols import pairs as pairing
 from ...evaluation.report import plots
-from ...evaluation.rows import records
+from ...evaluation.report import tables
+from ...evaluation.runner import run_pairs
 from . import inputs
 from .numbers import count
 from .numbers import positive
@@ -41,34 +42,33 @@ def measure(arguments: Namespace, folder: Path) -> None:
     methods = _methods(arguments)
     drives = inputs.drives_of(arguments)
     right = inputs.right_pairs(arguments, drives, arguments.limit)
-    wrong = selection.different_places(drives, arguments.wrong, arguments.seed)
-    rows = runner.run(Protocol.turned(right, arguments.seed), methods, warm_up=True)
+    wrong = pairing.wrong_pairs(drives, arguments.wrong, arguments.seed)
+    rows = run_pairs(right, methods, arguments.seed)
     refusing = [method for method in methods if method.refuses]
     if wrong and refusing:
-        rows += runner.run(Protocol.turned(wrong, arguments.seed), refusing, warm_up=True)
-    memory = runner.peak_memory_mb(methods, scans_of(right[0], arguments.seed)[0])
+        rows += run_pairs(wrong, refusing, arguments.seed)
+    memory = peak_memory_mb(methods, turned(right[0], arguments.seed)[0])
     names = [method.name for method in methods]
     text = '\n\n'.join((
-        pair_tables.pairs_table(rows, names, memory), pair_tables.data_sets_table(rows, names),
-        pair_tables.RULE + ' Peak memory: of a process of its own for each method, its libraries '
-        f'included; {memory[""]:.0f} MB of it are Python with numpy, scipy, numba and the two '
-        'scans.'))
-    inputs.finish(arguments, folder, text, records(rows), len(right), len(wrong))
+        tables.pairs_table(rows, names, memory), tables.data_sets_table(rows, names), tables.RULE
+        + ' Peak memory: of a process of its own for each method, its libraries included; '
+        f'{memory[""]:.0f} MB of it are Python with numpy, scipy, numba and the two scans.'))
+    inputs.finish(arguments, folder, text, scan_records(rows), len(right), len(wrong))
     plots.plot_pairs(folder / 'plot.png', rows, names)
 
 
 def _methods(arguments: Namespace) -> list[Method]:
     config = inputs.default_config(arguments)
-    known = {'sgor': on_scans('SGOR', config),
-             'paper': on_scans("SGOR, paper's settings", inputs.paper_config(arguments)),
-             **rivals_on_scans(inputs.say)}
+    known = {'sgor': sgor('SGOR', config),
+             'paper': sgor("SGOR, paper's settings", inputs.paper_config(arguments)),
+             **available(ON_SCANS, inputs.say)}
     for name in arguments.methods or ():
         if name not in known:
             raise InputError(f'--methods {name}: not one of {", ".join(known)}')
     chosen = [known[name] for name in arguments.methods or known]
     if arguments.label_noise:
-        chosen.append(on_scans(f'SGOR, {arguments.label_noise:.0%} of labels random', config,
+        chosen.append(sgor(f'SGOR, {arguments.label_noise:.0%} of labels random', config,
                            arguments.label_noise))
     if arguments.no_labels:
-        chosen.append(on_scans('SGOR, no labels', config, labels=False))
+        chosen.append(sgor('SGOR, no labels', config, labels=False))
     return chosen

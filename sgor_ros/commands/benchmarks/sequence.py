@@ -5,12 +5,15 @@ from pathlib import Path
 
 from ...core.common.settings import InputError
 from ...evaluation.methods import odometries
-from ...evaluation.odometry import run_drive
-from ...evaluation.protocols.scenes import scene_drive
-from ...evaluation.protocols.scenes import scene_kinds
-from ...evaluation.report import odometry_tables
+from ...evaluation.metrics.trajectory import require_evo
 from ...evaluation.report import plots
+from ...evaluation.report import tables
+from ...evaluation.report.consistency_table import consistency_table
+from ...evaluation.report.consistency_table import RULE
+from ...evaluation.sequences import run_drive
 from ...io.datasets import Drive
+from ..scene_pairs import scene_drive
+from ..scene_pairs import scene_kinds
 from . import inputs
 from .numbers import count
 
@@ -29,7 +32,8 @@ def add_options(command: ArgumentParser) -> None:
 
 
 def measure(arguments: Namespace, folder: Path) -> None:
-    """Compare odometries on drives, and what the tracker says of itself with the truth."""
+    """Compare odometries on drives, and the covariance that the tracker claims with the truth."""
+    require_evo()
     config = inputs.default_config(arguments)
     drives = [drive for drive in inputs.data_drives(arguments) if drive.T_world_sensor is not None
               and drive.heights_known and len(drive.scans) > 1]
@@ -49,7 +53,6 @@ def measure(arguments: Namespace, folder: Path) -> None:
         inputs.say(f'{kind}, {number} of {len(kinds)} kinds: scanning')
         drive = scene_drive(kind, arguments.per_kind, arguments.seed)
         tracks += run_drive(drive, makers, config)
-    text = '\n\n'.join((odometry_tables.sequence_table(tracks),
-                        odometry_tables.consistency_table(tracks), odometry_tables.RULE))
-    inputs.finish(arguments, folder, text, odometry_tables.scan_records(tracks))
+    text = '\n\n'.join((tables.sequence_table(tracks), consistency_table(tracks), RULE))
+    inputs.finish(arguments, folder, text, tables.scan_records(tracks))
     plots.plot_sequences(folder / 'plot.png', tracks)

@@ -5,20 +5,20 @@ from dataclasses import asdict
 from pathlib import Path
 
 from ...core.common.settings import InputError
-from ...evaluation import runner
-from ...evaluation.methods import rivals_on_matches
-from ...evaluation.pairs.pair import Pair
-from ...evaluation.protocols import solver
+from ...evaluation import solver
+from ...evaluation.methods import available
+from ...evaluation.methods import ON_MATCHES
+from ...evaluation.protocols.pairs import Pair
 from ...evaluation.report import plots
-from ...evaluation.report.solver_table import solver_table
-from ...evaluation.report.solver_table import solver_times
+from ...evaluation.report.tables import solver_table
 from . import inputs
 from .numbers import count
 from .numbers import positive
 from .numbers import share
 
 HELP = 'time of the solver on made-up matches, and on those of the FPFH of your scans'
-KISS_MATCHER = "KISS-Matcher's solver"
+OTHER = "KISS-Matcher's solver"
+"""Besides SGOR's, the one that is quick enough for so many matches."""
 
 
 def add_options(command: ArgumentParser) -> None:
@@ -38,25 +38,17 @@ def add_options(command: ArgumentParser) -> None:
 
 def measure(arguments: Namespace, folder: Path) -> None:
     """Time the solver on made-up matches, and on those of the FPFH of scans."""
-    config = inputs.default_config(arguments)
-    sets = [solver.made_up(count, arguments.inlier_share, arguments.seed)
-            for count in arguments.counts]
-    small = [pair for count, pair in zip(arguments.counts, sets, strict=True)
+    made_up = [solver.made_up(count, arguments.inlier_share, arguments.seed)
+               for count in arguments.counts]
+    others = available({OTHER: ON_MATCHES[OTHER]}, inputs.say)
+    rows = solver.run_solver([*made_up, *_of_scans(arguments)], inputs.default_config(arguments),
+                             arguments.runs, list(others.values()))
+    small = [pair for count, pair in zip(arguments.counts, made_up, strict=True)
              if count <= arguments.dense_limit]
-    sets += _of_scans(arguments)
-    methods = solver.presets(config)
-    rivals = rivals_on_matches(inputs.say)
-    if KISS_MATCHER in rivals:
-        methods.append(rivals[KISS_MATCHER])
-    # the first round only warms up, unless it is the only one
-    repeats = arguments.runs + 1 if arguments.runs > 1 else 1
-    rows = runner.run(solver.solver_protocol(sets), methods, repeats=repeats)
-    times = list(solver_times(rows, sets, arguments.runs, config))
     if small:
-        rows = runner.run(solver.solver_protocol(small), solver.dense_and_sparse())
-        times += solver_times(rows, small, 1, solver.DENSE_CONFIG)
-    inputs.finish(arguments, folder, solver_table(times), [asdict(each) for each in times])
-    plots.plot_solver(folder / 'plot.png', times)
+        rows += solver.run_dense(small)
+    inputs.finish(arguments, folder, solver_table(rows), [asdict(row) for row in rows])
+    plots.plot_solver(folder / 'plot.png', rows)
 
 
 def _of_scans(arguments: Namespace) -> list[Pair]:

@@ -6,17 +6,17 @@ from pathlib import Path
 import numpy as np
 
 from ...core.common.settings import InputError
-from ...evaluation import runner
-from ...evaluation.methods.sgor import on_scans
-from ...evaluation.pairs import selection
-from ...evaluation.pairs.pair import Pair
-from ...evaluation.protocols.protocol import Protocol
-from ...evaluation.protocols.scenes import scene_kinds
-from ...evaluation.protocols.scenes import scene_pairs
-from ...evaluation.report import consistency_tables
-from ...evaluation.report import pair_tables
+from ...evaluation.methods import sgor
+from ...evaluation.metrics.row import scan_records
+from ...evaluation.protocols import pairs as pairing
+from ...evaluation.protocols.pairs import Pair
+from ...evaluation.report import outcomes
 from ...evaluation.report import plots
-from ...evaluation.rows import records
+from ...evaluation.report.reliability_diagram import plot_reliability_diagram
+from ...evaluation.report.tables import confidence_table
+from ...evaluation.runner import run_pairs
+from ..scene_pairs import scene_kinds
+from ..scene_pairs import scene_pairs
 from . import inputs
 from .numbers import count
 
@@ -39,45 +39,41 @@ def add_options(command: ArgumentParser) -> None:
 def measure(arguments: Namespace, folder: Path) -> None:
     """Show how far confidence tells right from wrong, and what is known not to be known."""
     config = inputs.default_config(arguments)
-    methods = [on_scans('SGOR', config), on_scans('SGOR, no labels', config, labels=False)]
+    methods = [sgor('SGOR', config), sgor('SGOR, no labels', config, labels=False)]
     names = [method.name for method in methods]
     kinds = (scene_kinds(arguments.kinds or ())
              if inputs.wants_world(arguments) and arguments.per_kind else {})
     rows, texts = [], []
     if arguments.limit or arguments.count:
-        rows = runner.run(Protocol.turned(_right_and_wrong(arguments), arguments.seed), methods,
-                          warm_up=True)
+        rows = run_pairs(_right_and_wrong(arguments), methods, arguments.seed)
         labelled = [row for row in rows if row.method == names[0]]
         thresholds = sorted({*np.arange(0.4, 1.0, 0.05).round(2), config.min_confidence})
-        texts.append(pair_tables.confidence_table(labelled, thresholds, config.min_confidence)
-                     + f'\n\n{sum(row.same_place for row in labelled)} right and '
-                     f'{sum(not row.same_place for row in labelled)} wrong pairs. Answers that '
-                     'the default threshold refused keep the confidence that they were refused '
-                     'with.')
+        texts.append(confidence_table(labelled, thresholds, config.min_confidence)
+                     + f'\n\n{sum(row.right for row in labelled)} right and '
+                     f'{sum(not row.right for row in labelled)} wrong pairs. Answers that the '
+                     'default threshold refused keep the confidence that they were refused with.')
     elif not kinds:
         raise InputError('--limit 0 --count 0: nothing is left to do without --per-kind')
     for number, kind in enumerate(kinds, 1):
         inputs.say(f'{kind}, {number} of {len(kinds)} kinds: scanning')
-        rows += runner.run(Protocol.turned(
-            scene_pairs(kind, arguments.per_kind, arguments.seed), arguments.seed), methods,
-            warm_up=True)
+        rows += run_pairs(scene_pairs(kind, arguments.per_kind, arguments.seed), methods,
+                                  arguments.seed)
     repeating = [kind for kind, repeats in kinds.items() if repeats]
-    texts += [consistency_tables.trust_table(rows, names, repeating), consistency_tables.RULE,
-              consistency_tables.wrong_claims(rows, names),
-              consistency_tables.reliability_table(rows, names)]
-    right = sum(row.same_place for row in rows) // len(methods)
-    inputs.finish(arguments, folder, '\n\n'.join(texts), records(rows), right,
+    texts += [outcomes.outcome_table(rows, names, repeating), outcomes.RULE,
+              outcomes.wrong_claims(rows, names), outcomes.reliability_table(rows, names)]
+    right = sum(row.right for row in rows) // len(methods)
+    inputs.finish(arguments, folder, '\n\n'.join(texts), scan_records(rows), right,
                   len(rows) // len(methods) - right)
     if arguments.limit or arguments.count:
         plots.plot_confidence(folder / 'confidence.png', labelled, config.min_confidence)
-    plots.plot_reliability(folder / 'reliability.png', rows, names, config.min_confidence)
+    plot_reliability_diagram(folder / 'reliability.png', rows, names, config.min_confidence)
 
 
 def _right_and_wrong(arguments: Namespace) -> list[Pair]:
     drives = inputs.drives_of(arguments)
     right = inputs.right_pairs(arguments, drives, arguments.limit) if arguments.limit else []
-    different = selection.different_places(drives, arguments.count, arguments.seed)
+    different = pairing.wrong_pairs(drives, arguments.count, arguments.seed)
     if arguments.count and not different:
         raise InputError('no wrong pairs: they need two drives, or one longer than '
-                         f'{selection.NO_OVERLAP_M:g} m; add --world')
+                         f'{pairing.NO_OVERLAP_M:g} m; add --world')
     return right + different

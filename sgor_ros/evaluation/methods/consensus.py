@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 
 from ...core.common import se3
 from ...core.solver.hypotheses import fit_transforms
-from ..pairs.pair import Matches
+from .interface import Matches
 
 Array = NDArray[np.float64]
 

@@ -12,14 +12,14 @@ from scipy.sparse import csr_array
 from scipy.sparse import triu
 
 from ...core.solver.hypotheses import fit_transforms
-from ..pairs.pair import INDOOR_M
-from ..pairs.pair import Matches
 from .compatibility import length_differences
 from .compatibility import with_values
 from .compatibility import without_diagonal
 from .consensus import best
 from .consensus import refined
-from .method import Estimate
+from .interface import Answer
+from .interface import INDOOR_M
+from .interface import Matches
 
 Array = NDArray[np.float64]
 
@@ -30,7 +30,7 @@ MOST_CORE, THINNING = 64, 0.5
 can be listed: this share of the edges stays, the strongest."""
 
 
-def mac(matches: Matches) -> Estimate:
+def mac(matches: Matches) -> Answer:
     """Fit to each clique that is the heaviest of a match, and take the best."""
     least = LEAST_INDOOR if matches.inlier_m <= INDOOR_M else LEAST_OUTDOOR
     limit = matches.inlier_m * np.sqrt(1 - least)
@@ -39,7 +39,7 @@ def mac(matches: Matches) -> Estimate:
     second = (first @ first) * first
     cliques = _selected(csr_array(second))
     if not cliques:
-        return Estimate(None)
+        return Answer(None)
     T = np.concatenate([
         fit_transforms(matches.source[sets], matches.target[sets], np.ones(sets.shape))
         for sets in cliques])
@@ -47,7 +47,7 @@ def mac(matches: Matches) -> Estimate:
     def score(r: Array) -> float:
         return float(np.maximum(0, 1 - r / matches.inlier_m).sum())
 
-    return Estimate(refined(matches, best(matches, T, score), matches.inlier_m))
+    return Answer(refined(matches, best(matches, T, score), matches.inlier_m))
 
 
 def without_zeros(c: csr_array) -> csr_array:

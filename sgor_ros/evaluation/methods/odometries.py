@@ -1,7 +1,10 @@
-"""Odometries: each takes a scan at a time and returns T_odom_sensor; packages load when made."""
+"""Odometries, scan by scan: the tracker, KISS-ICP, GICP of small_gicp from scan to scan.
+
+A new one: a function that returns a step (scan in, T_odom_sensor out), and a line in `odometries`.
+"""
 from collections.abc import Callable
 from dataclasses import replace
-from importlib.util import find_spec
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,6 +15,7 @@ from ...core.scan.scan import SemanticScan
 from ...tracker import TrackedScan
 from ...tracker import Tracker
 from ...tracker import TrackerConfig
+from . import installed
 
 Array = NDArray[np.float64]
 Points = NDArray[np.float32]
@@ -24,27 +28,23 @@ Step = Callable[[SemanticScan], Array | None]
 def trackers(config: SgorConfig, *, unlabelled: bool) -> dict[str, Callable[[], Step]]:
     """Return what makes the tracker, by the name of its mode; also without labels if asked."""
     return {f'SGOR, {mode}{"" if labels else ", no labels"}':
-            lambda mode=mode, labels=labels: SgorTracker(config, mode, labels)    # type: ignore[misc]
+            partial(TrackerOdometry, config, mode, labels)
             for labels in (True, False)[:1 + unlabelled] for mode in ('consecutive', 'keyframe')}
 
 
 def odometries(config: SgorConfig, say: Callable[[str], None], *, unlabelled: bool = False
                ) -> dict[str, Callable[[], Step]]:
-    """Return what makes each odometry, by name; rivals where they are installed."""
+    """Return what makes each odometry, by name; others where they are installed."""
     makers = trackers(config, unlabelled=unlabelled)
-    if find_spec('kiss_icp') is None:
-        say('kiss_icp is not installed, so left out; to have it: pip install kiss-icp')
-    else:
+    if installed('kiss_icp', say):
         makers['KISS-ICP'] = lambda: _unlabelled(kiss_icp())
-    if find_spec('small_gicp') is None:
-        say("small_gicp is not installed, so left out; pip install 'sgor_ros[evaluation]'")
-    else:
+    if installed('small_gicp', say):
         makers['small_gicp, scan to scan'] = lambda: _unlabelled(scan_to_scan(config.threads))
     return makers
 
 
-class SgorTracker:
-    """The tracker, and its result for each scan, without the registration."""
+class TrackerOdometry:
+    """The tracker, and its answer to each scan."""
 
     def __init__(self, config: SgorConfig, mode: str, labels: bool) -> None:
         self._tracker = Tracker(config, TrackerConfig(mode=mode))
@@ -52,7 +52,7 @@ class SgorTracker:
         self.tracked: list[TrackedScan] = []
 
     def __call__(self, scan: SemanticScan) -> Array | None:
-        """Track a scan and return T_odom_sensor, if it has one."""
+        """Track a scan and return T_odom_sensor, if it has a pose."""
         # built anew, as a raw scan has to be
         labels = scan.labels if self._labels else np.zeros_like(scan.labels)
         result = self._tracker.track(SemanticScan(scan.points, labels),
@@ -61,7 +61,7 @@ class SgorTracker:
         return result.T_odom_sensor
 
 
-def _unlabelled(take: Callable[[Points], Array]) -> Step:
+def _unlabelled(take: Callable[[NDArray[np.float32]], Array]) -> Step:
     return lambda scan: take(scan.points)
 
 

@@ -9,14 +9,14 @@ from scipy.sparse import csr_array
 from scipy.spatial import cKDTree
 
 from ...core.solver.hypotheses import fit_transforms
-from ..pairs.pair import INDOOR_M
-from ..pairs.pair import Matches
 from .compatibility import leading_eigenvector
 from .compatibility import length_differences
 from .compatibility import with_values
 from .consensus import best
 from .consensus import refined
-from .method import Estimate
+from .interface import Answer
+from .interface import INDOOR_M
+from .interface import Matches
 
 Array = NDArray[np.float64]
 
@@ -29,13 +29,13 @@ REFINED_OUTDOOR_M = 1.2
 SEEDS_AT_ONCE = 256
 
 
-def sc2_pcr(matches: Matches) -> Estimate:
+def sc2_pcr(matches: Matches) -> Answer:
     """Consensus sets by second-order spatial compatibility, grown from seeds; the best wins."""
     n = len(matches.source)
     indoor = matches.inlier_m <= INDOOR_M
     rounds = ROUNDS_INDOOR if indoor else ROUNDS_OUTDOOR
     if n < SECOND:
-        return Estimate(None)
+        return Answer(None)
     c = length_differences(matches.source, matches.target, LENGTH_LIMIT_M)
     soft = with_values(c, 1 - (c.data / LENGTH_LIMIT_M)**2)
     hard = with_values(c, np.ones_like(c.data))
@@ -44,7 +44,7 @@ def sc2_pcr(matches: Matches) -> Estimate:
     T = np.concatenate([_hypotheses(matches, some, hard, tight, rounds) for some in
                         np.array_split(seeds, -(-len(seeds) // SEEDS_AT_ONCE))])
     chosen = best(matches, T, lambda r: float(np.count_nonzero(r < matches.inlier_m)))
-    return Estimate(refined(matches, chosen, matches.inlier_m if indoor else REFINED_OUTDOOR_M))
+    return Answer(refined(matches, chosen, matches.inlier_m if indoor else REFINED_OUTDOOR_M))
 
 
 def _seeds(source: Array, confidence: Array, radius: float) -> NDArray[np.intp]:

@@ -1,16 +1,6 @@
-"""The metrics of the field, each under its name.
+"""Metrics of the field, a file each.
 
-`registration`: RE, TE, registration recall, inlier precision and recall; `trajectory`: APE (ATE),
-RPE, drift as KITTI has it; `consistency`: NEES; `calibration`: outcomes, reliability diagram.
+`pose_error` (RE, TE, NEES), `inliers` (IP, IR, F1), `trajectory` (APE, RPE, drift),
+`registration_recall`, `reliability` (confidence against the share that is right), `consistency`
+(NEES along a track); and `row`, what one method made of one pair.
 """
-from .consistency import nees as nees
-from .consistency import NEES_BOUND as NEES_BOUND
-from .consistency import track_consistency as track_consistency
-from .registration import inlier_scores as inlier_scores
-from .registration import kept_scores as kept_scores
-from .registration import registration_recall as registration_recall
-from .registration import rotation_error_deg as rotation_error_deg
-from .registration import translation_error_m as translation_error_m
-from .trajectory import ape as ape
-from .trajectory import kitti_drift as kitti_drift
-from .trajectory import rpe as rpe

@@ -1,63 +1,26 @@
-"""Whether errors are as large as covariances claim: NEES of registrations and of a track.
-
-NEES (normalised estimation error squared) is chi-square distributed with 6 degrees of freedom
-where a covariance is consistent (Bar-Shalom et al., Estimation with Applications, 5.4).
-"""
+"""Consistency of a tracker: each scan of a drive, and its NEES, against the truth."""
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
-from scipy.stats import chi2
 
 from ...core.common import se3
 from ...tracker import State
 from ...tracker import TrackedScan
-from .registration import translation_error_m
+from .pose_error import nees
+from .pose_error import NEES_BOUND
+from .pose_error import translation_error_m
 
 Array = NDArray[np.float64]
 
-NEES_BOUND = float(chi2.ppf(0.9973, 6))
-"""The NEES of a pose stays below in as many cases as a number stays within 3 sigma."""
-
-LARGE_ERROR_M = 1.0
-"""A pose that is off by more, which its covariance excludes, is dangerous."""
-
-
-def nees(T_estimate: ArrayLike, T_truth: ArrayLike, covariance: ArrayLike | None) -> float:
-    """Return the normalised estimation error squared of a pose, by its own covariance.
-
-    Parameters
-    ----------
-    T_estimate, T_truth : (4, 4) array
-        T_target_source.
-    covariance : (6, 6) array or None
-        As of `Registration`.
-
-    Returns
-    -------
-    float
-        Squared Mahalanobis distance: 6 on average where the covariance is right; infinite where
-        it claims that there is no error at all in some direction, NaN without one.
-    """
-    if covariance is None:
-        return float('nan')
-    estimate, truth = np.asarray(T_estimate, np.float64), np.asarray(T_truth, np.float64)
-    turn = Rotation.from_matrix(truth[:3, :3] @ estimate[:3, :3].T).as_rotvec()
-    error = np.concatenate((truth[:3, 3] - estimate[:3, 3], turn))
-    try:
-        root = np.linalg.cholesky(np.asarray(covariance, np.float64))
-    except np.linalg.LinAlgError:
-        return float('inf')
-    whitened = np.linalg.solve(root, error)
-    return float(whitened @ whitened)
+METRES_WRONG = 1.0
+"""A pose that is off by more, outside of what its covariance allows, is dangerous."""
 
 
 @dataclass(frozen=True)
 class ScanConsistency:
-    """Errors of one scan of a track beside its covariances; NaN where it has none.
+    """What the tracker claims of one scan, and its error; NaN where it claims nothing.
 
     Attributes
     ----------
@@ -68,7 +31,7 @@ class ScanConsistency:
     claimed_m : float
         One standard deviation of that, by the covariance: root of the sum over x, y and z.
     step_nees, pose_nees : float
-        Squared normalised errors of the step to the reference, and of that pose.
+        Of the step to the reference, and of that pose.
     confirmed : bool
         Whether it was the prediction that the clouds confirmed, and SGOR did not run.
     """
@@ -81,14 +44,14 @@ class ScanConsistency:
     confirmed: bool
 
     @property
-    def inconsistent(self) -> bool:
+    def metres_wrong(self) -> bool:
         """Whether the pose is metres off, which its covariance excludes."""
-        return self.error_m > LARGE_ERROR_M and self.pose_nees > NEES_BOUND
+        return self.error_m > METRES_WRONG and self.pose_nees > NEES_BOUND
 
 
 def track_consistency(tracked: Sequence[TrackedScan], T_world_sensor: Array
                       ) -> list[ScanConsistency]:
-    """Compare the results of a tracker for N scans with their (N, 4, 4) true poses."""
+    """Compare what a tracker claims of N scans with their (N, 4, 4) true poses."""
     truth = {scan.stamp_ns: T for scan, T in zip(tracked, T_world_sensor, strict=True)}
     origin = {scan.track_id: truth[scan.stamp_ns] for scan in tracked if scan.restarted}
     return [_of_scan(scan, truth, origin) for scan in tracked]

@@ -1,5 +1,6 @@
-"""Errors of a trajectory: APE (ATE) and RPE by evo, and the drift of the KITTI benchmark."""
+"""Errors of trajectories: APE and RPE by evo, drift as the KITTI benchmark has it."""
 from dataclasses import dataclass
+from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
@@ -8,90 +9,53 @@ from numpy.typing import NDArray
 
 from ...core.common import se3
 from ...core.common.settings import InputError
-from ..extra import INSTALL
-from .registration import rotation_error_deg
-from .registration import translation_error_m
 
 Array = NDArray[np.float64]
 
 KITTI_LENGTHS_M = (100.0, 200.0, 300.0, 400.0, 500.0, 600.0, 700.0, 800.0)
 """Lengths over which the KITTI benchmark measures drift."""
-
 STRETCHES_M = (10.0, 20.0, 30.0, 40.0, 50.0, 60.0)
 """Lengths for the drift of a drive that is too short for those of KITTI."""
 
 
-@dataclass(frozen=True, eq=False)
-class TrajectoryErrors:
-    """Errors of a trajectory.
+def require_evo() -> None:
+    """Refuse to go on without evo, before anything is measured.
 
-    Attributes
-    ----------
-    rpe_rotation_deg, rpe_translation_m : (N - 1,) float64
-        RPE of each pose relative to the one before.
-    ape_translation_m : (N,) float64
-        APE of each position, the trajectories laid on each other at the first pose.
-    drift : Drift
-    length_m : float
-        Way travelled along the truth.
-    end_rotation_deg, end_translation_m : float
-        Error of the last pose, relative to the first.
-    estimate : (N, 4, 4) float64
-        The trajectory in the frame of the truth, laid on it at the first pose.
+    Raises
+    ------
+    InputError
+        It tells what to install.
     """
-
-    rpe_rotation_deg: Array
-    rpe_translation_m: Array
-    ape_translation_m: Array
-    drift: 'Drift'
-    length_m: float
-    end_rotation_deg: float
-    end_translation_m: float
-    estimate: Array
+    if find_spec('evo') is None:
+        raise InputError("the errors of trajectories need evo: pip install 'sgor_ros[evaluation]'")
 
 
-def trajectory_errors(T_odom_sensor: Array, T_world_sensor: Array,
-                      lengths_m: tuple[float, ...] = STRETCHES_M) -> TrajectoryErrors:
-    """Compare a trajectory (N, 4, 4), N at least 1, with the true poses of the same scans."""
-    T_world_odom = T_world_sensor[0] @ se3.inverse(T_odom_sensor[0])
-    estimate = T_world_odom @ T_odom_sensor
-    return TrajectoryErrors(
-        *rpe(estimate, T_world_sensor), ape(estimate, T_world_sensor),
-        kitti_drift(estimate, T_world_sensor, lengths_m), float(travelled_m(T_world_sensor)[-1]),
-        rotation_error_deg(estimate[-1], T_world_sensor[-1]),
-        translation_error_m(estimate[-1], T_world_sensor[-1]), estimate)
+def ape(T_estimate: ArrayLike, T_truth: ArrayLike) -> tuple[Array, Array]:
+    """Return the absolute pose error (APE, ATE), degrees and metres, (N,) each; not aligned."""
+    from evo.core.metrics import APE
+    return _by_evo(APE, T_estimate, T_truth)
 
 
-def ape(T_estimate: Array, T_truth: Array) -> Array:
-    """Return the absolute pose error of each position, (N,) metres, of (N, 4, 4) poses.
-
-    Its root mean square is the ATE. Nothing is aligned.
-    """
-    return _evo('APE', 'translation_part', T_estimate, T_truth)
-
-
-def rpe(T_estimate: Array, T_truth: Array) -> tuple[Array, Array]:
-    """Return the relative pose error of each pose to the one before, of (N, 4, 4) poses.
-
-    Returns
-    -------
-    rotation_deg, translation_m : (N - 1,) float64
-    """
-    if len(T_truth) < 2:
+def rpe(T_estimate: ArrayLike, T_truth: ArrayLike) -> tuple[Array, Array]:
+    """Return the relative pose error from pose to pose, degrees and metres, (N - 1,) each."""
+    from evo.core.metrics import RPE
+    if len(np.asarray(T_truth)) < 2:
         return np.empty(0), np.empty(0)
-    return (_evo('RPE', 'rotation_angle_deg', T_estimate, T_truth),
-            _evo('RPE', 'translation_part', T_estimate, T_truth))
+    return _by_evo(RPE, T_estimate, T_truth)
 
 
-def _evo(metric: str, relation: str, T_estimate: Array, T_truth: Array) -> Array:
-    try:
-        from evo.core import metrics
-        from evo.core.trajectory import PosePath3D
-    except ImportError as error:
-        raise InputError(f'errors of trajectories need evo ({error}): {INSTALL}') from error
-    found: Any = getattr(metrics, metric)(metrics.PoseRelation[relation])
-    found.process_data(tuple(PosePath3D(poses_se3=list(poses)) for poses in (T_truth, T_estimate)))
-    return np.asarray(found.error, np.float64)
+def _by_evo(metric: Any, T_estimate: ArrayLike, T_truth: ArrayLike) -> tuple[Array, Array]:
+    """Return a metric of evo for the angle and the translation of the error."""
+    from evo.core.metrics import PoseRelation
+    from evo.core.trajectory import PosePath3D
+    paths = tuple(PosePath3D(poses_se3=list(np.asarray(poses, np.float64)))
+                  for poses in (T_truth, T_estimate))
+    errors = []
+    for relation in (PoseRelation.rotation_angle_deg, PoseRelation.translation_part):
+        each = metric(relation)
+        each.process_data(paths)
+        errors.append(np.asarray(each.error, np.float64))
+    return errors[0], errors[1]
 
 
 @dataclass(frozen=True)
@@ -118,14 +82,13 @@ def travelled_m(T_world_sensor: ArrayLike) -> Array:
     return np.concatenate([[0.0], np.cumsum(steps)])
 
 
-def kitti_drift(T_estimate: ArrayLike, T_truth: ArrayLike,
-                lengths_m: tuple[float, ...] = KITTI_LENGTHS_M) -> Drift:
+def drift(T_estimate: ArrayLike, T_truth: ArrayLike,
+          lengths_m: tuple[float, ...] = KITTI_LENGTHS_M) -> Drift:
     """Measure the drift of a trajectory as the KITTI benchmark does.
 
     From each pose on, each length is travelled along the truth, and the error of the motion over
     that stretch is divided by the length. The benchmark starts at every tenth pose only; here
-    every pose starts, so that short trajectories give a figure too. RPE of evo takes the pose that
-    is nearest to a length in the place of the first beyond it, and one length at a time.
+    every pose starts, so that short trajectories give a figure too.
 
     Parameters
     ----------
@@ -160,3 +123,44 @@ def kitti_drift(T_estimate: ArrayLike, T_truth: ArrayLike,
         return Drift(float('nan'), float('nan'), 0)
     translation, rotation = np.mean(errors, axis=0)
     return Drift(float(100 * translation), float(rotation), len(errors))
+
+
+@dataclass(frozen=True, eq=False)
+class TrackErrors:
+    """Errors of a track.
+
+    Attributes
+    ----------
+    ape_m : (N,) float64
+        Absolute pose error, the translation of it.
+    rotation_deg, translation_m : (N - 1,) float64
+        Relative pose error: RE and TE of each pose relative to the one before.
+    drift : Drift
+    length_m : float
+        Way travelled along the truth.
+    end_rotation_deg, end_translation_m : float
+        Error of the last pose, relative to the first.
+    estimate : (N, 4, 4) float64
+        The track in the frame of the truth, laid on it at the first pose.
+    """
+
+    ape_m: Array
+    rotation_deg: Array
+    translation_m: Array
+    drift: Drift
+    length_m: float
+    end_rotation_deg: float
+    end_translation_m: float
+    estimate: Array
+
+
+def track_errors(T_odom_sensor: Array, T_world_sensor: Array,
+                 lengths_m: tuple[float, ...] = STRETCHES_M) -> TrackErrors:
+    """Compare a track (N, 4, 4), N at least 1, with the true poses of the same scans."""
+    T_world_odom = T_world_sensor[0] @ se3.inverse(T_odom_sensor[0])
+    estimate = T_world_odom @ T_odom_sensor
+    off_deg, off_m = ape(estimate, T_world_sensor)
+    return TrackErrors(off_m, *rpe(estimate, T_world_sensor),
+                       drift(estimate, T_world_sensor, lengths_m),
+                       float(travelled_m(T_world_sensor)[-1]), float(off_deg[-1]),
+                       float(off_m[-1]), estimate)

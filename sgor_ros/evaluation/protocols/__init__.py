@@ -1,5 +1,5 @@
-"""Protocols: lists of pairs with the truth, and the thresholds within which an answer is right.
+"""The protocols of the literature: which pairs, which thresholds.
 
-`kitti`, `indoor`, `posed` and `given` are those of the literature and of posed scans; `scenes` are
-places of the built-in world, `solver` sets of matches to time; `studies` and `ablation` vary them.
+`pairs` are those of any drives, `kitti`, `indoor`, `drives` and `match_files` make protocols of
+them; `studies` and `ablation` are what is varied; `truth` refines poses by ICP.
 """

@@ -5,8 +5,8 @@ from dataclasses import field
 from ...core.common.settings import Value
 from ...core.config import PAPER_STEPS
 from ...core.config import SgorConfig
-from ..methods.method import Method
-from ..methods.sgor import on_scans
+from ..methods import Method
+from ..methods import sgor
 
 WITHOUT: tuple[dict[str, Value], ...] = (
     *({name: value} for name, value in PAPER_STEPS.items()), {'scale': 1.0})
@@ -68,7 +68,7 @@ def methods(threads: int, *, only_paper: bool = False) -> list[Method]:
     configs |= {row.method: row.config for row in PAPER_ROWS}
     configs |= {'paper, wide reading of Eq. 3': paper.replace(labelled_ground=False),
                 'kitti_protocol': SgorConfig.kitti_protocol()}
-    return [on_scans(name, config.replace(threads=threads)) for name, config in configs.items()]
+    return [sgor(name, config.replace(threads=threads)) for name, config in configs.items()]
 
 
 def _name(change: dict[str, Value]) -> str:

@@ -12,9 +12,9 @@ from ...core.config import SgorConfig
 from ...core.scan.scan import SemanticScan
 from ...io.datasets import DriveScan
 from ...io.scans import read_scan
-from ..metrics.registration import INDOOR
-from ..pairs.pair import INDOOR_M
-from ..pairs.pair import Pair
+from ..methods.interface import INDOOR_M
+from ..metrics.registration_recall import INDOOR
+from .pairs import Pair
 from .protocol import Protocol
 
 Array = NDArray[np.float64]
@@ -80,8 +80,8 @@ def depth_frames(folder: Path, stride: int) -> Protocol:
         T_i, T_j = (np.loadtxt(str(path).replace('.depth.png', '.pose.txt'))
                     for path in (target, source))
         name = f'{folder.name} {source.name[6:12]} {target.name[6:12]}'
-        pairs.append(Pair(_depth(source, K), _depth(target, K), se3.inverse(T_i) @ T_j,
-                          name=name, group=folder.name))
+        pairs.append(Pair(_depth(source, K), _depth(target, K), se3.inverse(T_i) @ T_j, name=name,
+                          group=folder.name))
     return Protocol('depth_frames', pairs, (INDOOR,), INDOOR_M,
                     SgorConfig.indoor().paper_steps())
 

@@ -5,6 +5,7 @@ SC2-PCR and others use. The loop lists are those of the LiDAR registration bench
 """
 from collections.abc import Callable
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,14 +13,12 @@ from numpy.typing import NDArray
 
 from ...core.common import se3
 from ...core.common.settings import InputError
-from ...core.config import SgorConfig
 from ...io.datasets import Drive
 from ...io.datasets import DriveScan
-from ..metrics.registration import EASY
-from ..metrics.registration import LOOPS
-from ..pairs.pair import Pair
-from .protocol import INLIER_M
-from .protocol import KITTI
+from ..metrics.registration_recall import EASY
+from ..metrics.registration_recall import LOOPS
+from .pairs import Pair
+from .protocol import outdoor
 from .protocol import Protocol
 
 Array = NDArray[np.float64]
@@ -92,14 +91,14 @@ def kitti_10m(drives: Sequence[Drive], positions: Sequence[Array]) -> Protocol:
                   for i, j in ten_metre_pairs(where[:len(drive.scans)])
                   if (drive.name.rpartition('/')[2], i, j) != (f'{KNOWN_BAD[0]:02d}',
                                                               *KNOWN_BAD[1:])]
-    return _strict('kitti_10m', pairs, 0)
+    return outdoor('kitti_10m', pairs)
 
 
 def kitti_10m_list(path: Path, find: Finder) -> Protocol:
     """Return the pairs of a list of the 10 m kind, without the one that is known to be bad."""
     listed = [row for row in read_pair_list(path) if (row[0], row[1], row[3]) != KNOWN_BAD]
-    pairs, missing = _pairs(listed, find, lambda sequence: f'{sequence:02d}')
-    return _strict('kitti_10m', pairs, missing)
+    pairs, missing = _listed(listed, find, lambda sequence: f'{sequence:02d}')
+    return outdoor('kitti_10m', pairs, missing)
 
 
 def kitti_loops(paths: Sequence[Path], find: Finder) -> Protocol:
@@ -108,19 +107,13 @@ def kitti_loops(paths: Sequence[Path], find: Finder) -> Protocol:
     missing = 0
     for path in paths:
         band = path.stem.removeprefix('kitti_loops_').replace('_', '-') + ' m'
-        found, gone = _pairs(read_pair_list(path), find, lambda _, band=band: band)    # type: ignore[misc]
+        found, gone = _listed(read_pair_list(path), find, lambda _, band=band: band)    # type: ignore[misc]
         pairs += found
         missing += gone
-    return Protocol('kitti_loops', pairs, (LOOPS, EASY), INLIER_M, SgorConfig.kitti_protocol(),
-                    missing)
+    return replace(outdoor('kitti_loops', pairs, missing), thresholds=(LOOPS, EASY))
 
 
-def _strict(name: str, pairs: Sequence[Pair], missing: int) -> Protocol:
-    return Protocol(name, pairs, KITTI, INLIER_M, SgorConfig.kitti_protocol(),
-                    missing)
-
-
-def _pairs(rows: Sequence[tuple[int, int, int, int, Array]], find: Finder,
+def _listed(rows: Sequence[tuple[int, int, int, int, Array]], find: Finder,
            group: Callable[[int], str]) -> tuple[list[Pair], int]:
     pairs = []
     for sequence, i, other, j, T in rows:

@@ -1,22 +1,20 @@
-"""What a protocol is: pairs with the truth, thresholds, and a front end."""
+"""What a protocol asks: pairs with their truth, thresholds, and a front end."""
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Self
 
 from ...core.config import SgorConfig
-from ..metrics.registration import EASY
-from ..metrics.registration import HARD
-from ..metrics.registration import MEDIUM
-from ..metrics.registration import Threshold
-from ..pairs.pair import Pair
+from ..metrics.registration_recall import EASY
+from ..metrics.registration_recall import HARD
+from ..metrics.registration_recall import MEDIUM
+from ..metrics.row import Threshold
+from .pairs import Pair
 
 INLIER_M = 0.6
-KITTI = (EASY, MEDIUM, HARD)
 
 
 @dataclass(frozen=True, eq=False)
 class Protocol:
-    """What is run.
+    """How a table comes about.
 
     Attributes
     ----------
@@ -30,9 +28,6 @@ class Protocol:
         Makes the matches that all methods share.
     missing : int
         Pairs of the list whose scans are not there.
-    turn_seed : int or None
-        Sources are turned by random rotations that follow from it, so that no method profits from
-        a guess; None: as they are.
     """
 
     name: str
@@ -41,9 +36,9 @@ class Protocol:
     inlier_m: float
     front_end: SgorConfig
     missing: int = 0
-    turn_seed: int | None = None
 
-    @classmethod
-    def turned(cls, pairs: Sequence[Pair], seed: int) -> Self:
-        """Return outdoor pairs as raw scans, the sources turned."""
-        return cls('turned', pairs, (EASY,), INLIER_M, SgorConfig(), turn_seed=seed)
+
+def outdoor(name: str, pairs: Sequence[Pair], missing: int = 0) -> Protocol:
+    """Return a protocol with the thresholds, the inlier distance and the front end of KITTI's."""
+    return Protocol(name, pairs, (EASY, MEDIUM, HARD), INLIER_M, SgorConfig.kitti_protocol(),
+                    missing)

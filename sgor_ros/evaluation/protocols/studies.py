@@ -1,8 +1,8 @@
 """The studies of the paper: what they change, one value after the other."""
 from collections.abc import Callable
+from dataclasses import dataclass
 
 from ...core.common.settings import InputError
-from ..pairs.front_end import Variant
 
 COUNTS = (250, 500, 1000, 2000, 4000, 8000)
 CATEGORIES = (1, 2, 3, 5, 8)
@@ -13,6 +13,31 @@ STUDIES = {
     'categories': ('categories that keep their labels', CATEGORIES),
     'noise': ('share of random labels', NOISE)}
 """Name to what is on the axis and its values."""
+
+
+@dataclass(frozen=True)
+class Variant:
+    """What a study changes; the default changes nothing.
+
+    Attributes
+    ----------
+    name : str
+        What it is called in tables.
+    matches : int
+        So many of them, drawn at random; 0: all.
+    categories : int
+        The most frequent categories that are not ground stay, the others lose their labels; 0:
+        all stay.
+    random_labels : float
+        Share of the points whose label is drawn from those that occur.
+    seed : int
+    """
+
+    name: str = ''
+    matches: int = 0
+    categories: int = 0
+    random_labels: float = 0.0
+    seed: int = 0
 
 
 def variants(study: str, values: list[float] | None, seed: int) -> list[Variant]:

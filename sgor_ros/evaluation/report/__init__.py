@@ -1,6 +1,5 @@
-"""Tables, pictures and the files that a benchmark leaves.
+"""Tables and pictures of what was measured.
 
-`cells` defines what is printed, `pair_tables`, `consistency_tables`, `odometry_tables`,
-`solver_table` and `protocol_tables` put it together, `plots`, `trajectory_plots` and
-`protocol_plots` draw; `protocol_page` and `files` write, `published` has rows of papers.
+Of `sgor_benchmark`: `tables`, `plots`, `outcomes`, `reliability_diagram`, `consistency_table`. Of
+`sgor_tables`: `page`, `protocol_tables` and `protocol_plots`, beside `published` rows.
 """

@@ -2,13 +2,18 @@
 from collections.abc import Sequence
 from itertools import cycle
 from pathlib import Path
-from typing import Any
 from typing import Literal
 
+from matplotlib.axes import Axes
+from matplotlib.axis import Axis
+from matplotlib.figure import Figure
+from matplotlib.ticker import FormatStrFormatter
+from matplotlib.ticker import LogLocator
+from matplotlib.ticker import NullFormatter
 import numpy as np
 
 from ...io.colours import BLUE
-from ...io.colours import DIFFERENT_PLACES
+from ...io.colours import DIFFERENT
 from ...io.colours import GREEN
 from ...io.colours import GREY
 from ...io.colours import ORANGE
@@ -17,17 +22,12 @@ from ...io.colours import SERIES
 from ...io.colours import SKY
 from ...io.colours import TRUTH
 from ...io.colours import WRONG
-from ...io.plots import new_figure
-from ..metrics.calibration import BINS
-from ..metrics.calibration import reliability_diagram
-from ..metrics.registration import registration_recall
-from ..odometry import SETTLED
-from ..odometry import Track
-from ..protocols.solver import MADE_UP
-from ..rows import Row
-from .cells import in_band
-from .pair_tables import at_threshold
-from .solver_table import SolverTimes
+from ..metrics.registration_recall import at_threshold
+from ..metrics.row import Row
+from ..sequences import SETTLED
+from ..sequences import Track
+from ..solver import Solved
+from .tables import in_band
 
 DPI = 130
 # recall above which letters are white
@@ -38,10 +38,9 @@ BANDS_M = tuple((float(low), float(low + 6)) for low in range(0, 36, 6))
 
 def plot_pairs(path: Path, rows: Sequence[Row], methods: Sequence[str]) -> None:
     """Draw recall by distance, time and errors of each method, which has its line everywhere."""
-    figure = new_figure(14, 2.4 + 0.75 * len(methods))
+    figure = Figure(figsize=(14, 2.4 + 0.75 * len(methods)), layout='constrained')
     (recall, slow), (turned, moved) = figure.subplots(2, 2, sharey=True)
-    right = {name: [row for row in rows if row.method == name and row.same_place]
-             for name in methods}
+    right = {name: [row for row in rows if row.method == name and row.right] for name in methods}
     _recall(recall, right)
     _spread(slow, {name: [1e3 * row.seconds for row in own] for name, own in right.items()},
             'two raw scans to transform [ms]')
@@ -54,14 +53,14 @@ def plot_pairs(path: Path, rows: Sequence[Row], methods: Sequence[str]) -> None:
     figure.savefig(path, dpi=DPI)
 
 
-def _recall(axes: Any, right: dict[str, list[Row]]) -> None:
+def _recall(axes: Axes, right: dict[str, list[Row]]) -> None:
     """Write the recall of each method and band of distances into a field, dark where high."""
     shares = np.full((len(right), len(BANDS_M)), np.nan)
     for line, own in enumerate(right.values()):
         for column, (low, high) in enumerate(BANDS_M):
             band = in_band(own, low, high)
             if band:
-                share = shares[line, column] = registration_recall([row.success for row in band])
+                share = shares[line, column] = 100 * np.mean([row.success for row in band])
                 axes.text(column, line, f'{share:.0f}', ha='center', va='center', fontsize=10,
                           color='white' if share > DARK else 'black')
     axes.imshow(shares, cmap='Blues', vmin=0, vmax=120, aspect='auto')
@@ -72,7 +71,7 @@ def _recall(axes: Any, right: dict[str, list[Row]]) -> None:
     axes.spines[:].set_visible(False)
 
 
-def _spread(axes: Any, values: dict[str, list[float]], label: str) -> None:
+def _spread(axes: Axes, values: dict[str, list[float]], label: str) -> None:
     """Draw for each name the median, the quartiles, and 5 to 95 %."""
     for line, (name, own) in enumerate(values.items()):
         if own:
@@ -90,13 +89,10 @@ def _spread(axes: Any, values: dict[str, list[float]], label: str) -> None:
     axes.spines[['top', 'right']].set_visible(False)
 
 
-def _logarithmic(axes: Any, which: Literal['x', 'y']) -> None:
+def _logarithmic(axes: Axes, which: Literal['x', 'y']) -> None:
     """Make an axis logarithmic, with plain numbers at 1, 2 and 5 of each decade."""
-    from matplotlib.ticker import FormatStrFormatter
-    from matplotlib.ticker import LogLocator
-    from matplotlib.ticker import NullFormatter
     axes.set(**{f'{which}scale': 'log'})
-    axis = axes.xaxis if which == 'x' else axes.yaxis
+    axis: Axis = axes.xaxis if which == 'x' else axes.yaxis
     axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
     axis.set_major_formatter(FormatStrFormatter('%g'))
     axis.set_minor_formatter(NullFormatter())
@@ -104,13 +100,11 @@ def _logarithmic(axes: Any, which: Literal['x', 'y']) -> None:
 
 def plot_confidence(path: Path, rows: Sequence[Row], default: float) -> None:
     """Draw the confidence of right and wrong answers, and what each threshold gets wrong."""
-    figure = new_figure(12, 7.5)
+    figure = Figure(figsize=(12, 7.5), layout='constrained')
     top, bottom = figure.subplots(2, sharex=True)
-    kinds = {'right answers': ([r for r in rows if r.same_place and r.correct], RIGHT),
-             'right pairs, wrong answer': (
-                 [r for r in rows if r.same_place and not r.correct], WRONG),
-             'wrong pairs': ([r for r in rows if not r.same_place and not r.correct],
-                             DIFFERENT_PLACES)}
+    kinds = {'right answers': ([r for r in rows if r.right and r.within], RIGHT),
+             'right pairs, wrong answer': ([r for r in rows if r.right and not r.within], WRONG),
+             'wrong pairs': ([r for r in rows if not r.right and not r.within], DIFFERENT)}
     bins = np.linspace(0, 1, 41)
     for name, (part, colour) in kinds.items():
         if part:
@@ -123,7 +117,7 @@ def plot_confidence(path: Path, rows: Sequence[Row], default: float) -> None:
     for shares, name, colour, style in zip(
             curves, ('right answers refused', 'of pairs within 20 m',
                      'wrong answers of right pairs accepted', 'wrong pairs accepted'),
-            (RIGHT, RIGHT, WRONG, DIFFERENT_PLACES), ('-', ':', '--', '-.'), strict=True):
+            (RIGHT, RIGHT, WRONG, DIFFERENT), ('-', ':', '--', '-.'), strict=True):
         if len(shares[0]):
             bottom.plot(thresholds, [100 * part.mean() for part in shares], style, color=colour,
                         lw=2, label=name)
@@ -138,11 +132,10 @@ def plot_confidence(path: Path, rows: Sequence[Row], default: float) -> None:
 
 def plot_ablation(path: Path, rows: Sequence[Row], methods: Sequence[str]) -> None:
     """Draw recall over distance and median time of each setting."""
-    figure = new_figure(12, 0.36 * len(methods) + 1.5)
+    figure = Figure(figsize=(12, 0.36 * len(methods) + 1.5), layout='constrained')
     axes, slow = figure.subplots(1, 2, sharey=True)
     own = [[row for row in rows if row.method == name] for name in methods]
-    axes.barh(methods, [registration_recall([row.success for row in part]) for part in own],
-              color=BLUE)
+    axes.barh(methods, [100 * np.mean([row.success for row in part]) for part in own], color=BLUE)
     slow.barh(methods, [1e3 * np.median([row.seconds for row in part]) for part in own],
               color=ORANGE)
     axes.invert_yaxis()
@@ -156,14 +149,15 @@ def plot_ablation(path: Path, rows: Sequence[Row], methods: Sequence[str]) -> No
 def plot_sequences(path: Path, tracks: Sequence[Track]) -> None:
     """Draw, for each drive, the track from above, the growing error and the time of each scan."""
     drives = list(dict.fromkeys(track.drive for track in tracks))
-    figure = new_figure(15, 4.6 * len(drives))
+    figure = Figure(figsize=(15, 4.6 * len(drives)), layout='constrained')
     grid = figure.subplots(len(drives), 3, squeeze=False)
     for (above, error, slow), drive in zip(grid, drives, strict=True):
         own = [track for track in tracks if track.drive == drive]
         above.plot(*own[0].truth[:, :2, 3].T, color=TRUTH, lw=3, label='truth')
         for track, (colour, _, line) in zip(own, cycle(SERIES), strict=False):
-            estimate, off = track.errors.estimate, track.errors.ape_translation_m
+            estimate = track.errors.estimate
             above.plot(*estimate[:, :2, 3].T, line, color=colour, lw=1.2, label=track.method)
+            off = track.errors.ape_m
             error.plot(100 * off, line, color=colour, lw=1.4, label=track.method)
             slow.plot(np.arange(SETTLED, len(off)), 1e3 * track.seconds[SETTLED:], line,
                       color=colour, lw=1, label=track.method)
@@ -178,15 +172,15 @@ def plot_sequences(path: Path, tracks: Sequence[Track]) -> None:
     figure.savefig(path, dpi=DPI)
 
 
-def plot_solver(path: Path, rows: Sequence[SolverTimes]) -> None:
+def plot_solver(path: Path, rows: Sequence[Solved]) -> None:
     """Draw time against count on logarithmic axes."""
-    figure = new_figure(9, 6)
+    figure = Figure(figsize=(9, 6), layout='constrained')
     axes = figure.subplots()
     solvers = dict.fromkeys(row.solver for row in rows)
     for solver, (colour, marker, line) in zip(solvers, cycle(SERIES), strict=False):
         for made_up, style in ((True, marker + line), (False, 'x')):
             own = sorted((row.count, 1e3 * row.seconds_median) for row in rows
-                         if row.solver == solver and (row.matches == MADE_UP) is made_up)
+                         if row.solver == solver and (row.matches == 'made up') is made_up)
             if own:
                 axes.plot(*zip(*own, strict=True), style, color=colour, ms=7,
                           label=solver if made_up else f'{solver}, real matches')
@@ -195,47 +189,4 @@ def plot_solver(path: Path, rows: Sequence[SolverTimes]) -> None:
     axes.set(xlabel='correspondences', ylabel='time [ms]')
     axes.grid(alpha=0.25, which='both')
     axes.legend()
-    figure.savefig(path, dpi=DPI)
-
-
-def plot_reliability(path: Path, rows: Sequence[Row], methods: Sequence[str], default: float
-                     ) -> None:
-    """Draw the share that is right against the confidence, and how many there are of each.
-
-    Parameters
-    ----------
-    path : Path
-        Where to.
-    rows : sequence of Row
-    methods : sequence of str
-        Which of them, a column each.
-    default : float
-        The threshold below which answers are refused.
-    """
-    figure = new_figure(6.5 * len(methods), 7.5)
-    grid = figure.subplots(2, len(methods), sharex=True, squeeze=False, height_ratios=(2, 1))
-    for (top, bottom), name in zip(grid.T, methods, strict=True):
-        own = [row for row in rows if row.method == name]
-        bins = reliability_diagram(own)
-        top.plot((0, 100), (0, 100), ':', color=GREY, label='calibrated')
-        top.plot([100 * each.mean for each in bins],
-                 [100 * each.right / each.answers for each in bins], 'o-', color=BLUE,
-                 label='answers, refused ones too')
-        top.set(ylabel='share that is right [%]', ylim=(-3, 103))
-        top.set_title(name, loc='left', weight='bold')
-        kinds = {
-            'right': ([row for row in own if row.same_place and row.correct], RIGHT),
-            'wrong answer': ([row for row in own if row.same_place and not row.correct], WRONG),
-            'different places': ([row for row in own if not row.same_place], DIFFERENT_PLACES)}
-        shown = {kind: ([100 * row.confidence for row in part if not np.isnan(row.confidence)],
-                        colour) for kind, (part, colour) in kinds.items()}
-        bottom.hist([values for values, _ in shown.values()], 100 * np.array(BINS), stacked=True,
-                    color=[colour for _, colour in shown.values()],
-                    label=[f'{kind} ({len(values)})' for kind, (values, _) in shown.items()])
-        bottom.set(xlabel='confidence [%]', ylabel='answers', xlim=(0, 100))
-        for axes in (top, bottom):
-            axes.axvline(100 * default, color='black', ls='--', lw=1,
-                         label=f'min_confidence = {default:g}')
-            axes.grid(alpha=0.25)
-            axes.legend(fontsize=9)
     figure.savefig(path, dpi=DPI)

@@ -4,19 +4,15 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...core.common import se3
 from ...io.plots import new_figure
 from ...io.plots import save
-from ..methods.method import Estimate
-from ..metrics.registration import inlier_mask
-from ..metrics.registration import registration_recall
-from ..metrics.registration import Threshold
-from ..pairs.pair import Matches
-from ..pairs.pair import Pair
-from ..rows import Row
-from .cells import by_method
+from ..methods import Answer
+from ..methods import Matches
+from ..metrics.row import Row
+from ..metrics.row import Threshold
+from .protocol_tables import by_method
 
 RIGHT, WRONG = '#2a9d5c', '#c1121f'
 SHOWN = 400
@@ -34,7 +30,7 @@ def recall_along(path: Path, rows: Sequence[Row], threshold: Threshold, axis: st
         # the first are drawn broader: where curves are the same all of them are seen
         over = len(methods) - 1 - place
         names = list(dict.fromkeys(r.variant for r in own))
-        recall = [registration_recall([r.within(threshold) for r in own if r.variant == name])
+        recall = [100 * np.mean([r.below(threshold) for r in own if r.variant == name])
                   for name in names]
         axes.plot([float(name) for name in names], recall, '-', marker=MARKERS[place % 8],
                   color=COLOURS[place % 8], lw=1.5 + 2 * over, ms=5 + 3 * over, label=method)
@@ -65,23 +61,21 @@ def errors(path: Path, rows: Sequence[Row], threshold: Threshold) -> None:
     save(figure, path)
 
 
-def matches_before_and_after(path: Path, pair: Pair, matches: Matches,
-                             estimates: Mapping[str, Estimate]) -> None:
+def matches_before_and_after(path: Path, T_target_source: np.ndarray, matches: Matches,
+                             answers: Mapping[str, Answer]) -> None:
     """Draw the matches given and those that each method kept; right ones green, wrong ones red."""
-    figure = new_figure(3.4 * (1 + len(estimates)), 4.6)
+    figure = new_figure(3.4 * (1 + len(answers)), 4.6)
     every = np.arange(len(matches.source))
-    T_truth = pair.T_target_source
-    assert T_truth is not None
-    true = inlier_mask(matches.source, matches.target, T_truth, matches.inlier_m)
-    kept = {'given': every, **{name: _kept(matches, estimate)
-                               for name, estimate in estimates.items()}}
+    true = _fitting(matches, T_target_source)
+    kept = {'given': every, **{name: _kept(matches, answer)
+                               for name, answer in answers.items()}}
     # the target lies beside the source, as in the papers' pictures
     aside = np.array([0.0, 1.3 * np.ptp(matches.source[:, 1])])
     for axes, (name, rows) in zip(np.atleast_1d(figure.subplots(1, len(kept))), kept.items(),
                                   strict=True):
         shown = rows[::max(len(rows) // SHOWN, 1)]
         p = matches.source[:, :2]
-        q = se3.transform(se3.inverse(T_truth), matches.target)[:, :2] + aside
+        q = se3.transform(se3.inverse(T_target_source), matches.target)[:, :2] + aside
         for cloud in (p, q):
             axes.plot(*cloud[::4].T, ',', color='#999999')
         for is_true, colour in ((False, WRONG), (True, RIGHT)):
@@ -94,10 +88,14 @@ def matches_before_and_after(path: Path, pair: Pair, matches: Matches,
     save(figure, path)
 
 
-def _kept(matches: Matches, estimate: Estimate) -> NDArray[np.intp]:
-    if estimate.kept is not None:
-        return estimate.kept
-    if estimate.T_target_source is None:
+def _fitting(matches: Matches, T: np.ndarray) -> np.ndarray:
+    return np.linalg.norm(se3.transform(T, matches.source) - matches.target,
+                          axis=1) < matches.inlier_m
+
+
+def _kept(matches: Matches, answer: Answer) -> np.ndarray:
+    if answer.kept is not None:
+        return answer.kept
+    if answer.T_target_source is None:
         return np.empty(0, np.intp)
-    return np.flatnonzero(
-        inlier_mask(matches.source, matches.target, estimate.T_target_source, matches.inlier_m))
+    return np.flatnonzero(_fitting(matches, answer.T_target_source))

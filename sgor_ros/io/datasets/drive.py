@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from dataclasses import replace
 from functools import partial
 from typing import Self
+import warnings
 
 import numpy as np
 from numpy.typing import NDArray
@@ -93,6 +94,7 @@ class Drive:
     @property
     def frames(self) -> Sequence[DriveScan]:
         """The scans, by the name that they had before."""
+        warnings.warn('Drive.frames is Drive.scans now', DeprecationWarning, stacklevel=2)
         return self.scans
 
     @property

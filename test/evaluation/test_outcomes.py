@@ -1,6 +1,5 @@
 """What the benchmark counts as kept, refused, admitted and wrong."""
 import csv
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,30 +8,31 @@ from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
 from sgor_ros.commands.benchmark import main
+from sgor_ros.commands.scene_pairs import scene_pairs
 from sgor_ros.core.common import se3
 from sgor_ros.core.verdict.result import Placement
 from sgor_ros.core.verdict.result import Registration
 from sgor_ros.core.verdict.result import Status
-from sgor_ros.evaluation.methods import Estimate
+from sgor_ros.evaluation.methods import Answer
 from sgor_ros.evaluation.methods import Method
-from sgor_ros.evaluation.metrics import calibration
-from sgor_ros.evaluation.metrics import nees as nees_of
-from sgor_ros.evaluation.metrics import NEES_BOUND
-from sgor_ros.evaluation.protocols.protocol import Protocol
-from sgor_ros.evaluation.protocols.scenes import scene_pairs
-from sgor_ros.evaluation.report import consistency_tables
-from sgor_ros.evaluation.rows import Row
-from sgor_ros.evaluation.runner import run
+from sgor_ros.evaluation.metrics import reliability
+from sgor_ros.evaluation.metrics.pose_error import nees
+from sgor_ros.evaluation.metrics.pose_error import NEES_BOUND
+from sgor_ros.evaluation.metrics.registration_recall import outcomes
+from sgor_ros.evaluation.metrics.row import Row
+from sgor_ros.evaluation.protocols.pairs import Pair
+from sgor_ros.evaluation.report import outcomes as report
+from sgor_ros.evaluation.runner import run_pairs
 from sgor_ros.world.scenes import KINDS
 
 NAN = float('nan')
 
 
 def row(*, right=True, within=True, valid=True, **changes):
-    values = {'method': 'm', 'pair': 's t', 'group': 'd', 'source': 's', 'target': 't',
-              'same_place': right, 'distance_m': 5.0, 'rotation_error_deg': 0.1,
-              'translation_error_m': 0.02 if within else 9.0, 'accepted': valid, 'score': 0.9,
-              'seconds': 0.1, 'seconds_one_new': 0.05, 'confidence': 0.9}
+    values = {'method': 'm', 'data_set': 'd', 'source': 's', 'target': 't', 'right': right,
+              'distance_m': 5.0, 'rotation_error_deg': 0.1, 'translation_error_m': 0.02,
+              'within': within, 'valid': valid, 'score': 0.9, 'seconds': 0.1,
+              'seconds_one_new': 0.05, 'confidence': 0.9}
     return Row(**values | changes)
 
 
@@ -47,7 +47,7 @@ def test_nees_is_six_on_average_where_the_covariance_is_right():
     A = rng.normal(size=(6, 6)) * np.array([0.1, 0.02, 0.3, 0.001, 0.004, 0.002])[:, None]
     covariance = A @ A.T
     T = exp_left(np.array([4.0, -3, 1, 0.2, -0.4, 2.0]), np.eye(4))
-    found = np.array([nees_of(T, exp_left(noise, T), covariance)
+    found = np.array([nees(T, exp_left(noise, T), covariance)
                       for noise in rng.multivariate_normal(np.zeros(6), covariance, 4000)])
     assert found.mean() == pytest.approx(6.0, abs=0.25)
     assert np.mean(found > chi2.ppf(0.9, 6)) == pytest.approx(0.1, abs=0.02)
@@ -56,14 +56,14 @@ def test_nees_is_six_on_average_where_the_covariance_is_right():
 
 def test_nees_without_a_covariance_and_with_an_overconfident_one():
     T = exp_left(np.array([0.1, 0, 0, 0, 0, 0]), np.eye(4))
-    assert np.isnan(nees_of(np.eye(4), T, None))
-    assert nees_of(np.eye(4), T, np.zeros((6, 6))) == float('inf')
+    assert np.isnan(nees(np.eye(4), T, None))
+    assert nees(np.eye(4), T, np.zeros((6, 6))) == float('inf')
     # a direction in which metres are unknown excuses metres, and only there
     free = np.diag([25.0, 1e-4, 1e-4, 1e-6, 1e-6, 1e-6])
     far = exp_left(np.array([8.0, 0, 0, 0, 0, 0]), np.eye(4))
     aside = exp_left(np.array([8.0, 0.1, 0, 0, 0, 0]), np.eye(4))
-    assert nees_of(np.eye(4), far, free) == pytest.approx(64 / 25)
-    assert nees_of(np.eye(4), aside, free) > NEES_BOUND
+    assert nees(np.eye(4), far, free) == pytest.approx(64 / 25)
+    assert nees(np.eye(4), aside, free) > NEES_BOUND
 
 
 def test_three_sigma_is_of_six_dimensions():
@@ -82,7 +82,7 @@ def test_each_outcome_is_counted_once_where_it_belongs():
         row(right=False, within=False, valid=False, degenerate=1),
         row(right=False, within=False, valid=False, alternatives=1),
     ]
-    found = calibration.outcomes(rows)
+    found = outcomes(rows)
     assert (found.same, found.different) == (9, 4)
     assert (found.right_kept, found.right_refused, found.wrong_accepted) == (2, 2, 1)
     assert (found.degenerate, found.outside, found.ambiguous) == (3, 2, 1)
@@ -93,19 +93,18 @@ def test_each_outcome_is_counted_once_where_it_belongs():
 
 
 def test_nothing_to_count_gives_no_figures():
-    found = calibration.outcomes([])
+    found = outcomes([])
     assert (found.same, found.different, found.wrong) == (0, 0, 0)
     assert np.isnan(found.nees_mean)
-    assert '| 0 | - |' in consistency_tables.trust_table([row(method='other')], ['m'])
+    assert '| 0 | - |' in report.outcome_table([row(method='other')], ['m'])
 
 
 def test_the_table_has_a_line_for_each_kind_and_method():
-    rows = [row(group='tunnel', within=False), row(group='field', nees=6.0),
-            row(group='field', method='n', valid=False),
-            row(group='field', right=False, within=False)]
+    rows = [row(data_set='tunnel', within=False), row(data_set='field', nees=6.0),
+            row(data_set='field', method='n', valid=False),
+            row(data_set='field', right=False, within=False)]
     table = [[cell.strip() for cell in line.strip('|').split('|')]
-             for line in consistency_tables.trust_table(
-                 rows, ['m', 'n'], {'tunnel'}).splitlines()[2:]]
+             for line in report.outcome_table(rows, ['m', 'n'], {'tunnel'}).splitlines()[2:]]
     lines = {cells[0]: cells[1:] for cells in table}
     assert list(lines) == ['tunnel (repeats): m', 'tunnel (repeats): n', 'field: m', 'field: n',
                            '**all**: m', '**all**: n']
@@ -114,19 +113,19 @@ def test_the_table_has_a_line_for_each_kind_and_method():
                                  '100 %']
     assert lines['field: n'][:4] == ['1', '0', '1', '0']
     assert lines['**all**: m'][:4] == ['2', '1', '0', '1']
-    claims = consistency_tables.wrong_claims(rows, ['m'])
-    assert 'm: wrong 2 of 3 (1 wrong answers and 1 pairs of different places' in claims
+    said = report.wrong_claims(rows, ['m'])
+    assert 'm: wrong 2 of 3 (1 wrong answers and 1 pairs of different places' in said
 
 
 def test_reliability_asks_all_candidates_refused_ones_too():
     rows = [row(confidence=0.97), row(confidence=0.99, within=False),
             row(confidence=1.0, right=False, within=False), row(confidence=0.5, valid=False),
             row(confidence=NAN, within=False)]
-    low, high = calibration.reliability_diagram(rows)
+    low, high = reliability.reliability_diagram(rows)
     assert (low.low, low.high, low.answers, low.right) == (0.4, 0.6, 1, 1)
     assert (high.low, high.high, high.answers, high.right) == (0.95, 1.0, 3, 1)
     assert high.mean == pytest.approx((0.97 + 0.99 + 1.0) / 3)
-    lines = consistency_tables.reliability_table(rows, ['m']).splitlines()
+    lines = report.reliability_table(rows, ['m']).splitlines()
     assert lines[-1] == '| 0.95-1 | 33 % of 3 |'
     assert '| 0-0.2 | - |' in lines
 
@@ -147,24 +146,23 @@ def test_what_a_registration_says_of_itself_reaches_its_row(corridors):
         result = Registration(Status.AMBIGUOUS, 'slides', np.eye(4), np.empty((0, 3)),
                               np.empty((0, 3)), np.empty(0, bool), 0.7, covariance,
                               degenerate=free, alternatives=(other, other))
-        return Estimate(np.eye(4), None, False, 0.0, 0.1, 0.1, result)
+        return Answer(np.eye(4), valid=False, score=0.0, result=result)
 
-    found, = run(Protocol.turned([pair], 0), [Method('m', answer, 'scans')])
+    found, = run_pairs([pair], [Method('m', answer)], seed=0)
     assert (found.confidence, found.degenerate, found.alternatives) == (0.7, 1, 2)
     assert found.nees > 0
     # heights that nobody knows are no error
-    blind = replace(pair, heights_known=False)
-    assert np.isnan(run(Protocol.turned([blind], 0), [Method('m', answer, 'scans')])[0].nees)
-    # rivals say nothing of the kind
-    rival, = run(Protocol.turned([pair], 0),
-                 [Method('r', lambda _: Estimate(np.eye(4), score=1.0), 'scans')])
-    assert np.isnan(rival.confidence)
-    assert rival.degenerate == 0
+    blind = Pair(pair.source, pair.target, pair.T_target_source, heights_known=False)
+    assert np.isnan(run_pairs([blind], [Method('m', answer)], seed=0)[0].nees)
+    # other methods give nothing of the kind
+    other, = run_pairs([pair], [Method('r', lambda _: Answer(np.eye(4), score=1.0))], seed=0)
+    assert np.isnan(other.confidence)
+    assert other.degenerate == 0
 
 
 def test_scene_pairs_are_of_the_same_place_and_then_of_different_ones(corridors):
-    assert [pair.same_place for pair in corridors] == [True, True, False, False]
-    assert all(pair.group == 'corridor' for pair in corridors)
+    assert [pair.right for pair in corridors] == [True, True, False, False]
+    assert all(pair.data_set == 'corridor' for pair in corridors)
     for pair in corridors[:2]:
         assert 0.9 < pair.distance_m < 8.1
         a, b = pair.target.read(), pair.source.read()

@@ -3,23 +3,22 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from ...core.common import se3
-from ...core.config import SgorConfig
 from ...io.datasets import Drive
-from ..pairs.pair import Pair
-from ..pairs.selection import BAND_M
-from ..pairs.selection import near_pairs
-from .protocol import INLIER_M
-from .protocol import KITTI
+from .pairs import BAND_M
+from .pairs import near_pairs
+from .pairs import Pair
+from .protocol import outdoor
 from .protocol import Protocol
 
 
 def posed(drives: Sequence[Drive], max_distance_m: float, listed: Sequence[Pair] = ()
           ) -> Protocol:
     """Return all pairs of scans of a drive up to a distance, and listed ones, in bands of 10 m."""
-    # as in the tables of the literature heights count, however good they are
+    # errors count in z too, as in the literature
     pairs = [replace(pair, group=_band(pair.distance_m), heights_known=True)
-             for pair in [*near_pairs(drives, max_distance_m), *listed]]
-    return Protocol('poses', pairs, KITTI, INLIER_M, SgorConfig.kitti_protocol())
+             for pair in [*near_pairs(drives, max_distance_m), *listed]
+             if pair.T_target_source is not None]
+    return outdoor('poses', pairs)
 
 
 def strided(drives: Sequence[Drive], strides: Sequence[int]) -> Protocol:
@@ -33,7 +32,7 @@ def strided(drives: Sequence[Drive], strides: Sequence[int]) -> Protocol:
                            se3.inverse(T[i]) @ T[i + stride],
                            name=f'{drive.name} {i + stride} {i}', group=f'stride {stride}')
                       for i in range(len(drive.scans) - stride)]
-    return Protocol('strides', pairs, KITTI, INLIER_M, SgorConfig.kitti_protocol())
+    return outdoor('strides', pairs)
 
 
 def _band(distance_m: float) -> str:

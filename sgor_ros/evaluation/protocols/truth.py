@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from tqdm import tqdm
 
 from ...core.common.settings import InputError
-from ..extra import progress
-from .pair import Pair
+from .pairs import Pair
 
 Array = NDArray[np.float64]
 
@@ -26,7 +26,7 @@ def refined(pairs: Iterable[Pair], cache: Path) -> list[Pair]:
     """
     known = _read(cache)
     done = []
-    for pair in progress(list(pairs), 'ground truth'):
+    for pair in tqdm(list(pairs), 'ground truth', unit='pair', disable=None):
         if pair.name not in known:
             known[pair.name] = _icp(pair).tolist()
             cache.parent.mkdir(parents=True, exist_ok=True)
@@ -49,15 +49,16 @@ def _read(cache: Path) -> dict[str, Any]:
 
 def _icp(pair: Pair) -> Array:
     import open3d as o3d
+    truth = pair.T_target_source
+    assert truth is not None
     registration = o3d.pipelines.registration
-    assert pair.T_target_source is not None
     source, target = (o3d.geometry.PointCloud(o3d.utility.Vector3dVector(
-        scan.read().points.astype(np.float64))).voxel_down_sample(VOXEL_M)
-        for scan in pair.scans)
-    source.transform(pair.T_target_source)
+        frame.read().points.astype(np.float64))).voxel_down_sample(VOXEL_M)
+        for frame in pair.scans)
+    source.transform(truth)
     found = registration.registration_icp(
         source, target, REACH_M, np.eye(4),
         registration.TransformationEstimationPointToPoint(False),
         registration.ICPConvergenceCriteria(max_iteration=ROUNDS))
-    T: Array = np.asarray(found.transformation) @ pair.T_target_source
+    T: Array = np.asarray(found.transformation) @ truth
     return T

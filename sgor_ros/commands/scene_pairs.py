@@ -4,13 +4,13 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.common import se3
-from ...core.common.settings import InputError
-from ...io.datasets import Drive
-from ...io.datasets import DriveScan
-from ..pairs.pair import Pair
-from ..pairs.selection import drive_of
-from ..pairs.selection import scan_in_memory
+from ..core.common import se3
+from ..core.common.settings import InputError
+from ..evaluation.protocols.pairs import drive_of
+from ..evaluation.protocols.pairs import frame_in_memory
+from ..evaluation.protocols.pairs import Pair
+from ..io.datasets import Drive
+from ..io.datasets import DriveScan
 
 
 def scene_kinds(names: Sequence[str]) -> dict[str, bool]:
@@ -22,7 +22,7 @@ def scene_kinds(names: Sequence[str]) -> dict[str, bool]:
         A name that is none, or no Open3D.
     """
     try:
-        from ...world.scenes import KINDS
+        from ..world.scenes import KINDS
     except ImportError as error:
         raise InputError(f'the built-in world needs Open3D ({error}): '
                          'pip install open3d') from error
@@ -49,8 +49,8 @@ def scene_pairs(kind: str, count: int, seed: int) -> list[Pair]:
     list of Pair
         First `count` pairs of the same place, then `count` of different places.
     """
-    from ...world import Lidar
-    from ...world import scenes
+    from ..world import Lidar
+    from ..world import scenes
     rng = np.random.default_rng([seed, list(scenes.KINDS).index(kind)])
     lidar = Lidar()
     same: list[Pair] = []
@@ -60,7 +60,7 @@ def scene_pairs(kind: str, count: int, seed: int) -> list[Pair]:
 
         def scan(pose: NDArray[np.float64], role: str, place: scenes.Place = place,
                  index: int = index) -> DriveScan:
-            return scan_in_memory(f'{kind}/{index:03d}/{role}', kind,
+            return frame_in_memory(f'{kind}/{index:03d}/{role}', kind,
                                    *lidar.scan(place, pose, rng))
 
         T_world_target, T_world_source = scenes.random_pair(place, rng,
@@ -69,11 +69,11 @@ def scene_pairs(kind: str, count: int, seed: int) -> list[Pair]:
         if index < count:
             same.append(Pair(scan(T_world_source, 'source'), targets[-1],
                              se3.inverse(T_world_target) @ T_world_source))
-    return same + [Pair(pair.source, target, None, same_place=False)
+    return same + [Pair(pair.source, target, None, right=False)
                    for pair, target in zip(same, targets[1:], strict=True)]
 
 
 def scene_drive(kind: str, count: int, seed: int) -> Drive:
     """Drive through the place of a kind and a seed, as far apart as its scans are meant to be."""
-    from ...world import simulate
+    from ..world import simulate
     return drive_of(kind, (scan[1:] for scan in simulate(count, seed, place=kind)))

@@ -1,27 +1,34 @@
-"""Rivals on given matches: small cases by hand, an independent version, and the shared sets."""
+"""Methods on given matches: small cases by hand, an independent version, and the shared sets."""
+import os
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 from sgor_ros import SgorConfig
 from sgor_ros.core.common import se3
+from sgor_ros.evaluation.methods import available
 from sgor_ros.evaluation.methods import Matches
-from sgor_ros.evaluation.methods import rivals_on_matches
+from sgor_ros.evaluation.methods import ON_MATCHES
+from sgor_ros.evaluation.methods import sgor_solver
 from sgor_ros.evaluation.methods.compatibility import leading_eigenvector
 from sgor_ros.evaluation.methods.compatibility import length_differences
 from sgor_ros.evaluation.methods.compatibility import with_values
 from sgor_ros.evaluation.methods.mac import _selected
 from sgor_ros.evaluation.methods.sc2_pcr import _seeds
 from sgor_ros.evaluation.methods.sc2_pcr import sc2_pcr
-from sgor_ros.evaluation.methods.sgor import on_matches
-from sgor_ros.evaluation.methods.spectral_matching import spectral_matching
-from sgor_ros.evaluation.metrics import kept_scores
-from sgor_ros.evaluation.metrics import rotation_error_deg
-from sgor_ros.evaluation.metrics import translation_error_m
-from sgor_ros.evaluation.report.cells import percent
+from sgor_ros.evaluation.methods.spectral import spectral_matching
+from sgor_ros.evaluation.metrics.inliers import kept_scores
+from sgor_ros.evaluation.metrics.pose_error import rotation_error_deg
+from sgor_ros.evaluation.metrics.pose_error import translation_error_m
+from sgor_ros.evaluation.report.protocol_tables import percent
 
+DATA = Path(os.environ.get('SGOR_DATA', Path(__file__).resolve().parents[3] / 'shared/data'))
+SETS = DATA / 'correspondences'
 T_TRUE = se3.compose(Rotation.from_euler('zyx', [0.7, 0.05, -0.1]).as_matrix(),
                      np.array([3.0, -2.0, 0.5]))
+METHODS = {'SGOR': sgor_solver('SGOR', SgorConfig.paper()), **available(ON_MATCHES, print)}
 
 
 def made_up(count, right, seed=0, noise=0.01):
@@ -147,54 +154,52 @@ def test_cliques_of_a_graph_by_hand():
 
 def test_spectral_matching_keeps_a_tenth():
     matches = made_up(300, 30)
-    solution = spectral_matching(matches)
-    assert len(solution.kept) == 30
-    scores = kept_scores(matches.source, matches.target, solution.kept, T_TRUE, 0.6)
+    answer = spectral_matching(matches)
+    assert len(answer.kept) == 30
+    scores = kept_scores(matches.source, matches.target, answer.kept, T_TRUE, 0.6)
     assert scores.recall > 0.9
-    assert translation_error_m(solution.T_target_source, T_TRUE) < 0.3
+    assert translation_error_m(answer.T_target_source, T_TRUE) < 0.3
 
 
-@pytest.mark.parametrize('name', ['SGOR', *rivals_on_matches(print)])
+@pytest.mark.parametrize('name', METHODS)
 def test_nothing_to_find_is_no_error(name):
     """Two matches, and many that agree in nothing: None or some transformation, no exception."""
-    method = {'SGOR': on_matches('SGOR', SgorConfig.paper()), **rivals_on_matches(print)}[name]
+    method = METHODS[name].on_matches
     rng = np.random.default_rng(0)
     for count in (2, 200):
-        solution = method.run(Matches.of(rng.uniform(-50, 50, (count, 3)),
+        answer = method(Matches.of(rng.uniform(-50, 50, (count, 3)),
                                      rng.uniform(-50, 50, (count, 3)), 0.1))
-        assert solution.T_target_source is None or solution.T_target_source.shape == (4, 4)
+        assert answer.T_target_source is None or answer.T_target_source.shape == (4, 4)
 
 
-@pytest.mark.parametrize('name', ['SGOR', *(name for name in rivals_on_matches(print)
-                                            if name != 'FGR')])
+@pytest.mark.parametrize('name', [name for name in METHODS if name != 'FGR'])
 def test_each_method_solves_an_easy_case(name):
     """A third of 300 right: published figures of all but FGR are near 100 % there."""
-    method = {'SGOR': on_matches('SGOR', SgorConfig.paper()), **rivals_on_matches(print)}[name]
+    method = METHODS[name].on_matches
     matches = made_up(300, 100, 3)
-    found = method.run(matches).T_target_source
+    found = method(matches).T_target_source
     assert rotation_error_deg(found, T_TRUE) < 1.5
     assert translation_error_m(found, T_TRUE) < 0.3
 
 
+@pytest.mark.skipif(not SETS.is_dir(), reason='no shared data')
 @pytest.mark.parametrize('name', ['kitti_000', 'kitti_010', 'kitti_020', '3dmatch'])
-def test_published_behaviour_on_real_matches(name, data_folder):
+def test_published_behaviour_on_real_matches(name):
     """SC2-PCR and MAC solve sets like these (97 to 99 % of KITTI), spectral matching not all.
 
     2 % right on KITTI and 3.7 % indoors, where spectral matching solves under a third as printed.
     """
-    sets = data_folder / 'correspondences'
     if name == '3dmatch':
-        both = np.loadtxt(sets / '3dmatch_source_target.txt')
+        both = np.loadtxt(SETS / '3dmatch_source_target.txt')
         source, target, limit = both[:, :3], both[:, 3:], (0.1, 15.0, 0.3)
     else:
-        source, target = (np.loadtxt(sets / f'{name}_{end}.txt') for end in ('source', 'target'))
+        source, target = (np.loadtxt(SETS / f'{name}_{end}.txt') for end in ('source', 'target'))
         limit = (0.6, 5.0, 0.6)
-    truth = np.loadtxt(sets / f'{name}_T_target_source.txt')
+    truth = np.loadtxt(SETS / f'{name}_T_target_source.txt')
     matches = Matches.of(source, target, limit[0])
-    methods = rivals_on_matches(print)
     right = {}
     for method in ('SC2-PCR', 'MAC', 'SM'):
-        T = methods[method].run(matches).T_target_source
+        T = METHODS[method].on_matches(matches).T_target_source
         right[method] = (rotation_error_deg(T, truth) < limit[1]
                          and translation_error_m(T, truth) < limit[2])
     assert right['SC2-PCR']
@@ -204,3 +209,12 @@ def test_published_behaviour_on_real_matches(name, data_folder):
 
 def test_percent_is_printed_as_in_the_literature():
     assert percent([True] * 549 + [False] * 6) == '98.92'
+
+
+def test_the_former_name_of_an_answer_is_told():
+    from sgor_ros.evaluation import methods
+    with pytest.warns(DeprecationWarning, match='Solution is Answer now'):
+        former = methods.Solution
+    assert former is methods.Answer
+    with pytest.raises(AttributeError, match='Reply'):
+        _ = methods.Reply

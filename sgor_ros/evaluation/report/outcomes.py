@@ -1,16 +1,16 @@
-"""Tables of verdicts and confidence: what was kept and refused, rightly or not."""
+"""What becomes of pairs, by kind of place: kept, refused, degenerate, ambiguous, wrong."""
 from collections.abc import Collection
 from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
 
-from ..metrics.calibration import BINS
-from ..metrics.calibration import outcomes
-from ..metrics.calibration import reliability_diagram
-from ..metrics.consistency import NEES_BOUND
-from ..rows import Row
-from .cells import markdown
+from ..metrics.pose_error import NEES_BOUND
+from ..metrics.registration_recall import outcomes
+from ..metrics.reliability import BINS
+from ..metrics.reliability import reliability_diagram
+from ..metrics.row import Row
+from .tables import markdown
 
 RULE = ('Right: within 5 deg and 60 cm. Kept: with `success`; all others are refused. Degenerate '
         'and ambiguous: refused because the clouds slide on each other, or because several '
@@ -19,7 +19,7 @@ RULE = ('Right: within 5 deg and 60 cm. Kept: with `success`; all others are ref
         'and kept, 6 where the covariance is right, and the share of it up to that bound.')
 
 
-def trust_table(rows: Sequence[Row], methods: Sequence[str], repeating: Collection[str] = ()
+def outcome_table(rows: Sequence[Row], methods: Sequence[str], repeating: Collection[str] = ()
                 ) -> str:
     """Return what became of pairs, by data set or kind of place.
 
@@ -32,10 +32,10 @@ def trust_table(rows: Sequence[Row], methods: Sequence[str], repeating: Collecti
         Data sets whose places repeat themselves, so that no answer can be the only one.
     """
     lines = []
-    for data_set in dict.fromkeys(row.group for row in rows):
+    for data_set in dict.fromkeys(row.data_set for row in rows):
         mark = ' (repeats)' if data_set in repeating else ''
         lines += [_line(f'{data_set}{mark}: {name}', [
-            row for row in rows if (row.method, row.group) == (name, data_set)])
+            row for row in rows if (row.method, row.data_set) == (name, data_set)])
             for name in methods]
     lines += [_line(f'**all**: {name}', [row for row in rows if row.method == name])
               for name in methods]

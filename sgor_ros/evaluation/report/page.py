@@ -5,19 +5,19 @@ import math
 from pathlib import Path
 
 from ...core.common.settings import InputError
-from ..methods.method import Method
-from ..pairs.front_end import Features
-from ..pairs.front_end import shared_matches
-from ..pairs.front_end import Variant
+from ..front_end import Features
+from ..front_end import shared_matches
+from ..methods import Method
+from ..metrics.row import Row
 from ..protocols.protocol import Protocol
 from ..protocols.studies import STUDIES
-from ..rows import Row
+from ..protocols.studies import Variant
 from . import protocol_plots as plots
-from .cells import latex
-from .cells import markdown
+from .protocol_tables import latex
 from .protocol_tables import main_rows
 from .protocol_tables import variant_rows
 from .protocol_tables import whole
+from .tables import markdown
 
 PICTURED = 4
 """Methods of the picture of matches."""
@@ -25,29 +25,29 @@ Z = 1.96
 """Of a 95 % interval."""
 
 
-def write(folder: Path, rows: Sequence[Row], protocol: Protocol, methods: Sequence[Method],
+def write(folder: Path, measured: Sequence[Row], protocol: Protocol, methods: Sequence[Method],
           study: str, features: Features | None) -> str:
     """Write ``results.md``, ``table.tex`` and the pictures of a run; return the tables."""
     first = protocol.thresholds[0]
     if study:
         axis = STUDIES[study][0]
-        header, lines = variant_rows(rows, first)
-        text = f'{axis}\n\n{markdown(header, lines)}'
-        plots.recall_along(folder / 'study.png', rows, first, axis)
+        header, rows = variant_rows(measured, first)
+        text = f'{axis}\n\n{markdown(header, rows)}'
+        plots.recall_along(folder / 'study.png', measured, first, axis)
         pictures = ['study.png']
     else:
-        header, lines = main_rows(rows, protocol, first)
-        text = whole(rows, protocol)
-        plots.errors(folder / 'errors.png', rows, first)
+        header, rows = main_rows(measured, protocol, first)
+        text = whole(measured, protocol)
+        plots.errors(folder / 'errors.png', measured, first)
         pictures = ['errors.png', *_matches(folder, protocol, methods, features)]
-    pairs = len({r.pair for r in rows})
+    pairs = len({r.pair for r in measured})
     setup = json.loads((folder / 'setup.json').read_text())
-    (folder / 'table.tex').write_text(latex(header, lines) + '\n')
-    page = [f'# {protocol.name}', text, _caution(pairs),
+    (folder / 'table.tex').write_text(latex(header, rows) + '\n')
+    lines = [f'# {protocol.name}', text, _caution(pairs),
              *(f'![{picture}]({picture})' for picture in pictures),
              f'Commit {setup["revision"]}; settings and versions in setup.json, all pairs in '
              'pairs.csv.']
-    (folder / 'results.md').write_text('\n\n'.join(page) + '\n')
+    (folder / 'results.md').write_text('\n\n'.join(lines) + '\n')
     return text
 
 
@@ -55,16 +55,17 @@ def _matches(folder: Path, protocol: Protocol, methods: Sequence[Method],
              features: Features | None) -> list[str]:
     """Draw the matches of the pair in the middle, before and after some of the methods."""
     pair = protocol.pairs[len(protocol.pairs) // 2]
+    assert pair.T_target_source is not None
     try:
         given = shared_matches(pair, protocol.front_end, protocol.inlier_m, Variant(), features)
     except InputError:
         return []
-    estimates = {method.name: method.run(given) for method in methods
-                 if method.takes == 'matches' and method.front_end is None}
-    chosen = dict(list(estimates.items())[:PICTURED])
+    answers = {method.name: method.on_matches(given) for method in methods
+               if method.on_matches is not None and method.front_end is None}
+    chosen = dict(list(answers.items())[:PICTURED])
     if not chosen:
         return []
-    plots.matches_before_and_after(folder / 'matches.png', pair, given, chosen)
+    plots.matches_before_and_after(folder / 'matches.png', pair.T_target_source, given, chosen)
     return ['matches.png']
 
 

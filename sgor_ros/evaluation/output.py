@@ -1,4 +1,4 @@
-"""The files that a benchmark leaves, and on what they were made."""
+"""The files that a benchmark leaves, and what it was made with."""
 from collections.abc import Sequence
 import csv
 import json
@@ -6,10 +6,10 @@ from pathlib import Path
 import subprocess
 from typing import Any
 
-from ...io.environment import describe_environment
+from ..io.environment import describe_environment
 
 PACKAGES = ('sgor_ros', 'numpy', 'scipy', 'numba', 'small_gicp', 'kiss_matcher', 'kiss-icp',
-            'open3d-cpu', 'open3d', 'evo')
+            'open3d-cpu', 'open3d')
 
 
 def save(folder: Path, text: str, records: Sequence[dict[str, Any]], setup: dict[str, Any]
@@ -21,7 +21,7 @@ def save(folder: Path, text: str, records: Sequence[dict[str, Any]], setup: dict
     folder : Path
         Made where there is none.
     text : str
-        Tables and what has to be said about them.
+        Tables and the rules that they follow.
     records : sequence of dict
         Lines of the CSV file.
     setup : dict
@@ -33,12 +33,12 @@ def save(folder: Path, text: str, records: Sequence[dict[str, Any]], setup: dict
         writer = csv.DictWriter(file, list(records[0]))
         writer.writeheader()
         writer.writerows(records)
-    (folder / 'run.json').write_text(
-        json.dumps({**setup, **environment()}, indent=2, default=str) + '\n')
+    document = {**setup, **describe_run()}
+    (folder / 'run.json').write_text(json.dumps(document, indent=2, default=str) + '\n')
 
 
-def environment() -> dict[str, Any]:
-    """Return versions and machine, and the revision of the package."""
+def describe_run() -> dict[str, Any]:
+    """Return versions, machine and revision."""
     return {'environment': describe_environment(PACKAGES), 'revision': revision()}
 
 

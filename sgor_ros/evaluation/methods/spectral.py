@@ -2,12 +2,12 @@
 import numpy as np
 
 from ...core.solver.hypotheses import fit_transforms
-from ..pairs.pair import Matches
 from .compatibility import leading_eigenvector
 from .compatibility import length_differences
 from .compatibility import with_values
 from .compatibility import without_diagonal
-from .method import Estimate
+from .interface import Answer
+from .interface import Matches
 
 SIGMA_SHARE = 1 / 3
 """sigma_d of the affinity 4.5 - c^2 / (2 sigma_d^2), of the inlier threshold."""
@@ -15,7 +15,7 @@ TOP_SHARE = 0.1
 ROUNDS = 10
 
 
-def spectral_matching(matches: Matches) -> Estimate:
+def spectral_matching(matches: Matches) -> Answer:
     """Keep the tenth with the largest entries of the leading eigenvector, and fit to them."""
     sigma = SIGMA_SHARE * matches.inlier_m
     c = length_differences(matches.source, matches.target, 3 * sigma)
@@ -24,7 +24,7 @@ def spectral_matching(matches: Matches) -> Estimate:
     kept = np.argsort(-confidence, kind='stable')[:int(TOP_SHARE * len(confidence))]
     kept = kept[confidence[kept] > 0]
     if len(kept) < 3:
-        return Estimate(None)
+        return Answer(None)
     T, = fit_transforms(matches.source[kept][None], matches.target[kept][None],
                         confidence[kept][None])
-    return Estimate(T, kept)
+    return Answer(T, kept)

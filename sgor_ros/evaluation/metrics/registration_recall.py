@@ -1,19 +1,36 @@
-"""How far verdicts and confidence can be trusted: outcomes, and the reliability diagram."""
+"""Registration recall (RR), and what else becomes of pairs: refused, degenerate, accepted wrongly.
+
+RR is the share of pairs whose answer is within the threshold on RE and TE and not refused.
+"""
+from collections.abc import Iterable
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ..rows import Row
-from .consistency import NEES_BOUND
+from .pose_error import NEES_BOUND
+from .row import Row
+from .row import Threshold
 
-BINS = (0.0, 0.2, 0.4, 0.6, 0.7, 0.8, 0.85, 0.9, 0.95, 1.0)
-"""Of confidence; finer where it matters."""
+EASY = Threshold('easy', 5.0, 0.6)
+"""The strict thresholds of the literature on KITTI."""
+MEDIUM = Threshold('medium', 5.0, 0.3)
+HARD = Threshold('hard', 2.0, 0.1)
+LOOPS = Threshold('5 deg, 2 m', 5.0, 2.0)
+INDOOR = Threshold('15 deg, 30 cm', 15.0, 0.3)
+
+NEAR_M = 20.0
+
+
+def registration_recall(rows: Sequence[Row]) -> float:
+    """Return RR, 0 to 1; NaN of no rows."""
+    return sum(row.success for row in rows) / len(rows) if rows else float('nan')
 
 
 @dataclass(frozen=True)
 class Outcomes:
-    """What became of some pairs; all but the last three are numbers of pairs.
+    """What became of some pairs; all but the last two are numbers of pairs.
 
     Attributes
     ----------
@@ -50,15 +67,15 @@ class Outcomes:
         return self.wrong_accepted + self.outside + self.accepted
 
 
-def outcomes(rows: Sequence[Row]) -> Outcomes:
+def outcomes(rows: Iterable[Row]) -> Outcomes:
     """Count what became of pairs."""
-    same, different = ([row for row in rows if row.same_place is same] for same in (True, False))
+    rows = list(rows)
+    same, different = ([row for row in rows if row.right is right] for right in (True, False))
     degenerate = [row for row in same if _degenerate(row)]
     nees = np.array([row.nees for row in same if row.success and not np.isnan(row.nees)])
     return Outcomes(
         len(same), sum(row.success for row in same),
-        sum(row.correct and not row.accepted for row in same),
-        sum(row.false_accept for row in same),
+        sum(row.within and not row.valid for row in same), sum(row.false_accept for row in same),
         # without a covariance nothing holds the error
         len(degenerate), sum(not row.nees <= NEES_BOUND for row in degenerate),
         sum(_ambiguous(row) for row in same),
@@ -69,41 +86,25 @@ def outcomes(rows: Sequence[Row]) -> Outcomes:
 
 
 def _degenerate(row: Row) -> bool:
-    return not row.accepted and row.degenerate > 0
+    return not row.valid and row.degenerate > 0
 
 
 def _ambiguous(row: Row) -> bool:
-    return not row.accepted and row.alternatives > 0
+    return not row.valid and row.alternatives > 0
 
 
-@dataclass(frozen=True)
-class Bin:
-    """Answers of like confidence.
+def at_threshold(rows: Sequence[Row], threshold: float) -> tuple[NDArray[np.bool_], ...]:
+    """Tell for each answer of four kinds whether a threshold would get it wrong.
 
-    Attributes
-    ----------
-    low, high : float
-        Bounds of the confidence.
-    answers : int
-    mean : float
-        Their mean confidence.
-    right : int
-        How many of them are right.
+    Returns
+    -------
+    tuple of (K,) bool
+        Right answers refused; of pairs within 20 m; wrong answers to right pairs accepted; wrong
+        pairs accepted.
     """
-
-    low: float
-    high: float
-    answers: int
-    mean: float
-    right: int
-
-
-def reliability_diagram(rows: Sequence[Row]) -> list[Bin]:
-    """Sort all candidates, refused ones too, by confidence; bins without any are left out."""
-    known = [row for row in rows if not np.isnan(row.confidence)]
-    confidence = np.array([row.confidence for row in known])
-    right = np.array([row.same_place and row.correct for row in known], bool)
-    where = np.clip(np.digitize(confidence, BINS) - 1, 0, len(BINS) - 2)
-    return [Bin(BINS[i], BINS[i + 1], int(own.sum()), float(confidence[own].mean()),
-                int(right[own].sum()))
-            for i in range(len(BINS) - 1) if (own := where == i).any()]
+    right = [row for row in rows if row.right and row.within]
+    near = [row for row in right if row.distance_m <= NEAR_M]
+    bad = [row for row in rows if row.right and not row.within]
+    wrong = [row for row in rows if not row.right and not row.within]
+    return (*(np.array([row.score < threshold for row in part], bool) for part in (right, near)),
+            *(np.array([row.score >= threshold for row in part], bool) for part in (bad, wrong)))

@@ -6,19 +6,18 @@ import time
 
 import numpy as np
 from numpy.typing import NDArray
+from tqdm import tqdm
 
 from ..core.config import SgorConfig
 from ..core.warmup import warm_up
 from ..io.datasets import Drive
-from .extra import progress
-from .methods.odometries import SgorTracker
 from .methods.odometries import Step
+from .methods.odometries import TrackerOdometry
 from .metrics.consistency import ScanConsistency
 from .metrics.consistency import track_consistency
 from .metrics.trajectory import KITTI_LENGTHS_M
-from .metrics.trajectory import trajectory_errors
-from .metrics.trajectory import TrajectoryErrors
-from .metrics.trajectory import travelled_m
+from .metrics.trajectory import track_errors
+from .metrics.trajectory import TrackErrors
 
 Array = NDArray[np.float64]
 
@@ -33,7 +32,7 @@ class Track:
     Attributes
     ----------
     method, drive : str
-    errors : TrajectoryErrors
+    errors : TrackErrors
         Where a scan got no pose, the last one stands.
     truth : (N, 4, 4) float64
         T_world_sensor.
@@ -44,12 +43,12 @@ class Track:
     cpu_seconds : (N,) float64
         Of all threads together: what the clock shows depends on who else wants the cores.
     consistency : list of ScanConsistency
-        For each scan; empty where the odometry has no covariance.
+        For each scan; empty where the odometry gives nothing but poses.
     """
 
     method: str
     drive: str
-    errors: TrajectoryErrors
+    errors: TrackErrors
     truth: Array
     lengths_m: tuple[float, ...]
     without_pose: int
@@ -66,14 +65,14 @@ def run_drive(drive: Drive, makers: dict[str, Callable[[], Step]], config: SgorC
     warm_up(config)
     for make in makers.values():
         step = make()
-        for drive_scan in drive.scans[:2]:
-            step(drive_scan.read())
+        for frame in drive.scans[:2]:
+            step(frame.read())
     odometry = {name: make() for name, make in makers.items()}
     poses: dict[str, list[Array | None]] = {name: [] for name in makers}
     seconds: dict[str, list[tuple[float, float]]] = {name: [] for name in makers}
     rng = np.random.default_rng(0)
-    for drive_scan in progress(drive.scans, drive.name, unit='scan'):
-        scan = drive_scan.read()
+    for frame in tqdm(drive.scans, drive.name, unit='scan', disable=None):
+        scan = frame.read()
         for name in rng.permutation(list(makers)):
             start, cpu_start = time.perf_counter(), time.process_time()
             T = odometry[name](scan)
@@ -88,12 +87,12 @@ def _track(method: str, drive: str, poses: Sequence[Array | None], truth: Array,
     held: list[Array] = []
     for T in poses:
         held.append(T if T is not None else held[-1] if held else np.eye(4))
-    way = float(travelled_m(truth)[-1])
+    way = float(np.linalg.norm(np.diff(truth[:, :3, 3], axis=0), axis=1).sum())
     # those of the KITTI benchmark, shrunk to a drive that is shorter than theirs
     shrink = min(1.0, way / 1000)
     lengths = tuple(round(length * shrink, 2) for length in KITTI_LENGTHS_M)
     clock, processor = np.array(seconds).T
-    return Track(method, drive, trajectory_errors(np.array(held), truth, lengths), truth, lengths,
+    return Track(method, drive, track_errors(np.array(held), truth, lengths), truth, lengths,
                  sum(T is None for T in poses), clock, processor,
                  track_consistency(odometry.tracked, truth)
-                 if isinstance(odometry, SgorTracker) else [])
+                 if isinstance(odometry, TrackerOdometry) else [])

@@ -16,7 +16,7 @@ from ...io.colours import SURE
 from ...io.colours import TRUTH
 from ...io.plots import new_figure
 from ...io.plots import save
-from ..metrics.trajectory import TrajectoryErrors
+from ..metrics.trajectory import TrackErrors
 from ..metrics.trajectory import travelled_m
 
 Array = NDArray[np.float64]
@@ -88,7 +88,7 @@ def plot_track(path: str | Path, title: str, stamps_s: Sequence[float],
     save(figure, path)
 
 
-def plot_against_truth(path: Path, errors: TrajectoryErrors, T_world_sensor: Array,
+def plot_against_truth(path: Path, errors: TrackErrors, T_world_sensor: Array,
                        world: LabelledPoints) -> None:
     """Draw truth and track from above.
 
@@ -96,7 +96,7 @@ def plot_against_truth(path: Path, errors: TrajectoryErrors, T_world_sensor: Arr
     ----------
     path : Path
         PNG to write.
-    errors : TrajectoryErrors
+    errors : TrackErrors
     T_world_sensor : (N, 4, 4) array
         The truth, of all scans.
     world : LabelledPoints
@@ -120,7 +120,7 @@ def plot_against_truth(path: Path, errors: TrajectoryErrors, T_world_sensor: Arr
     save(figure, path)
 
 
-def plot_errors(path: Path, errors: TrajectoryErrors, scans: NDArray[np.int_], seconds: Array,
+def plot_errors(path: Path, errors: TrackErrors, scans: NDArray[np.int_], seconds: Array,
                 period_s: float) -> None:
     """Draw the errors of consecutive pairs and the time of each scan, one below the other.
 
@@ -128,7 +128,7 @@ def plot_errors(path: Path, errors: TrajectoryErrors, scans: NDArray[np.int_], s
     ----------
     path : Path
         PNG to write.
-    errors : TrajectoryErrors
+    errors : TrackErrors
     scans : (N,) array of int
         Numbers of the scans that have a pose.
     seconds : (N,) array
@@ -138,9 +138,8 @@ def plot_errors(path: Path, errors: TrajectoryErrors, scans: NDArray[np.int_], s
     """
     figure = new_figure(12, 7.5)
     top, middle, bottom = figure.subplots(3, sharex=True)
-    _draw_series(top, scans[1:], 100 * errors.rpe_translation_m, 'TE of the pair [cm]',
-                 '{:.2f} cm')
-    _draw_series(middle, scans[1:], errors.rpe_rotation_deg, 'RE of the pair [deg]', '{:.3f} deg')
+    _draw_series(top, scans[1:], 100 * errors.translation_m, 'TE of the pair [cm]', '{:.2f} cm')
+    _draw_series(middle, scans[1:], errors.rotation_deg, 'RE of the pair [deg]', '{:.3f} deg')
     _draw_times(bottom, scans, seconds, period_s)
     bottom.set_xlabel('scan')
     save(figure, path)
