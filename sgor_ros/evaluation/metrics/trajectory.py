@@ -50,12 +50,12 @@ def _by_evo(metric: Any, T_estimate: ArrayLike, T_truth: ArrayLike) -> tuple[Arr
     from evo.core.trajectory import PosePath3D
     paths = tuple(PosePath3D(poses_se3=list(np.asarray(poses, np.float64)))
                   for poses in (T_truth, T_estimate))
-    errors = []
-    for relation in (PoseRelation.rotation_angle_deg, PoseRelation.translation_part):
-        each = metric(relation)
+    turned, moved = metric(PoseRelation.full_transformation), metric(PoseRelation.translation_part)
+    for each in (turned, moved):
         each.process_data(paths)
-        errors.append(np.asarray(each.error, np.float64))
-    return errors[0], errors[1]
+    # evo's own angle refuses rotations that were rounded in a file
+    angles = [np.rad2deg(se3.angle(error[:3, :3])) for error in turned.E]
+    return np.array(angles), np.asarray(moved.error, np.float64)
 
 
 @dataclass(frozen=True)
