@@ -30,7 +30,7 @@ for config in (SgorConfig(), SgorConfig.paper(), SgorConfig.kitti_protocol(), Sg
         walls = np.round(rng.uniform(-20, 20, (2000, 3)) / edge) * edge
         for points in (walls, walls[:1].repeat(50, 0), walls * (1, 0, 0), walls[:5], walls[:1]):
             prepared = preprocess(SemanticScan(points), config.replace(min_range=0.0))
-            register(prepared, prepared, config)
+            register(prepared, prepared)
     for count in (3, 63, 64, 65, 500):
         source = rng.uniform(-30, 30, (count, 3))
         wrong = rng.uniform(-30, 30, (count, 3))
