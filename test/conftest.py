@@ -13,8 +13,10 @@ from sgor_ros.world import simulate
 PERIOD_NS = 100_000_000
 
 
-SLOW_ROOMS = {'commands', 'evaluation', 'node', 'package', 'world'}
-"""Processes, DDS, drives and tables: `make test-fast` leaves them out."""
+SLOW_ROOMS = {'commands', 'evaluation', 'execution', 'files', 'node', 'package', 'pipeline',
+              'world', 'test_bounds.py', 'test_hints.py', 'test_paper.py', 'test_places.py',
+              'test_tracker.py'}
+"""Processes, DDS, files, drives, tables, whole places: `make test-fast` leaves them out."""
 SLOW_FIXTURES = {'data_folder', 'domain'}
 
 

@@ -64,8 +64,8 @@ def test_a_scan_of_another_place_is_not_confirmed(pair, elsewhere):
     _, target, truth = pair
     other = preprocess(SemanticScan(*elsewhere[0][:2]), CONFIG)
     found = check_prediction(other, target, truth, CONFIG.replace(min_confidence=0.0))
-    assert found.status is Status.REFUSED
-    assert found.reason
+    assert found.status is Status.AMBIGUOUS
+    assert 'ambiguous: 2 placements' in found.reason
     refused = check_prediction(other, target, truth, CONFIG)
     assert refused.status is Status.REFUSED
     assert 'min_confidence 0.85' in refused.reason
@@ -75,7 +75,7 @@ def test_a_scan_of_another_place_is_not_confirmed(pair, elsewhere):
 def test_where_scans_slide_or_repeat_nothing_is_confirmed(kind):
     """An expectation there would confirm itself, the true one too."""
     drive = scene_drive(kind, 2, seed=3)
-    target, source = (preprocess(frame.read(), CONFIG) for frame in drive.frames)
+    target, source = (preprocess(frame.read(), CONFIG) for frame in drive.scans)
     truth = relative(*drive.T_world_sensor)
     for along in (0.0, 0.8, -2.0):
         found = check_prediction(source, target, truth @ moved(along), CONFIG)

@@ -113,7 +113,7 @@ def nuscenes(data_folder):
     """Return the first five prepared scans of nuScenes, their config and T_world_sensor."""
     drive, = open_drives(data_folder / 'nuscenes')
     config = SgorConfig(label_convention='nuscenes')
-    scans = [preprocess(frame.read(), config) for frame in drive.frames[:5]]
+    scans = [preprocess(frame.read(), config) for frame in drive.scans[:5]]
     return scans, config, drive.T_world_sensor
 
 

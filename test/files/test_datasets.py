@@ -380,5 +380,5 @@ def test_the_example_of_the_docs(street, tmp_path, capsys):
     exec(code, scope)
     assert capsys.readouterr().out == 'park 2 semantickitti\n'
     assert scope['tracked'].success
-    metres, _ = errors(scope['tracked'].T_odom_sensor, relative(street[0][2], scope['truth']))
+    metres, _ = errors(scope['tracked'].T_odom_sensor, relative(street[0][2], scope['truth'][-1]))
     assert metres < 0.1

@@ -77,7 +77,7 @@ def test_poses_are_those_of_the_first_scan(scans, street, mode):
 def test_real_scans(data_folder, mode):
     """Ten scans of KITTI 08: the end within 0.3 m and 1 degree, none failed."""
     drive = next(d for d in open_drives(data_folder / 'kitti') if d.name.endswith('08'))
-    results = track([frame.read() for frame in drive.frames[:10]], mode=mode)
+    results = track([frame.read() for frame in drive.scans[:10]], mode=mode)
     assert all(result.success for result in results)
     assert_near(results[-1].T_odom_sensor,
                 relative(drive.T_world_sensor[0], drive.T_world_sensor[9]), 0.3, 1.0)

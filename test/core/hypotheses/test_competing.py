@@ -241,7 +241,7 @@ def test_along_weak_directions_the_search_goes_on_step_by_step(bare):
 
 
 def test_compete_with_radius_zero_scores_the_pose_alone(pillars):
-    config = SgorConfig(rival_radius=0.0)
+    config = SgorConfig(hypothesis_radius=0.0)
     T = moved(0.3)
     for found in (compete(pillars, pillars, T, moved(8)[None], config),
                   alone(pillars, pillars, T)):
@@ -272,10 +272,10 @@ def test_a_pose_that_scores_too_low_gets_more_rounds():
     np.testing.assert_array_equal(more.competing_outcomes, plain.competing_outcomes)
 
 
-def test_compete_looks_within_the_rival_radius():
+def test_compete_looks_within_the_hypothesis_radius():
     index = index_of(*gallery(pitch=5.0))
     for radius, shifts in ((7.0, [-5, 5]), (30.0, [-10, -5, 5, 10])):
-        found = compete(index, index, np.eye(4), NOTHING, SgorConfig(rival_radius=radius))
+        found = compete(index, index, np.eye(4), NOTHING, SgorConfig(hypothesis_radius=radius))
         np.testing.assert_allclose(along(found), shifts, atol=0.01)
 
 

@@ -72,7 +72,7 @@ def test_streets_are_of_scale_one_whatever_the_sensor(street, data_folder):
     scans = [SemanticScan(points[::step], labels[::step]) for points, labels, _ in street
              for step in (1, 4)]
     for drive in open_drives(data_folder):
-        scans += [frame.read() for frame in drive.frames[::5]]
+        scans += [frame.read() for frame in drive.scans[::5]]
     scans += [SemanticScan(scan.points[::4]) for scan in scans[-5:]]
     assert {preprocess(scan).scale for scan in scans} == {1.0}
     fixed = preprocess(scans[0], SgorConfig(scale=1.0))
