@@ -5,9 +5,11 @@ from galleries import moved
 import numpy as np
 import pytest
 
+from sgor_ros.core.degeneracy import perturbation_test as perturbation_module
 from sgor_ros.core.degeneracy.perturbation_test import is_degenerate
 from sgor_ros.core.degeneracy.perturbation_test import measured
 from sgor_ros.core.degeneracy.perturbation_test import pushes_along
+from sgor_ros.core.icp.point_to_plane import icp
 from sgor_ros.core.scoring.pose_scoring import score_keypoints
 
 ALONG_X = np.array([1.0, 0, 0, 0, 0, 0])
@@ -172,3 +174,15 @@ def test_a_turn_stays_the_turn_that_it_was():
     found = measure(shaft, twist, lever=8.2)
     np.testing.assert_array_equal(found.twist, twist)
     assert found.sigma == pytest.approx(30 / np.sqrt(3))
+
+
+def test_longer_pushes_go_both_ways(bare, monkeypatch):
+    """By 4 and by 16 maximum distances, forth and back of each."""
+    pushed = []
+
+    def fitted(source, target, T_target_source, *rounds):
+        pushed.extend(T_target_source[:, 0, 3])
+        return icp(source, target, T_target_source, *rounds)
+    monkeypatch.setattr(perturbation_module, 'icp', fitted)
+    measure(bare, ALONG_X)
+    assert pushed == pytest.approx([2.4, -2.4, 9.6, -9.6])

@@ -6,10 +6,12 @@ from galleries import NOTHING
 import numpy as np
 import pytest
 
+from sgor_ros.core.hypotheses import weak_direction_search as search_module
 from sgor_ros.core.hypotheses.weak_direction_search import _peaks
 from sgor_ros.core.hypotheses.weak_direction_search import _score
 from sgor_ros.core.hypotheses.weak_direction_search import _tuned
 from sgor_ros.core.hypotheses.weak_direction_search import search_weak_directions
+from sgor_ros.core.scoring.pose_scoring import score_keypoints
 
 ALONG_X = np.array([[1.0, 0, 0, 0, 0, 0]])
 
@@ -128,3 +130,18 @@ def test_distances_are_from_the_answer_and_not_from_the_target(pillars):
     assert np.abs(shifts).max() < 10.0
     for shift in (-8, 8):
         assert np.abs(shifts - shift).min() < 0.25
+
+
+def test_the_search_covers_the_radius_both_ways(bare, monkeypatch):
+    """Step by step, a maximum distance each, from one end to the other."""
+    asked = []
+
+    def scored(source, target, T_target_source, keypoints):
+        asked.append(np.array(T_target_source))
+        return score_keypoints(source, target, T_target_source, keypoints)
+    monkeypatch.setattr(search_module, 'score_keypoints', scored)
+    search_weak_directions(bare, bare, np.eye(4), NOTHING, ALONG_X, 12.2)
+    steps = asked[1][:, 0, 3]
+    np.testing.assert_allclose(np.diff(steps), bare.max_distance)
+    assert steps[0] == pytest.approx(-12.2)
+    assert 12.2 <= steps[-1] < 12.2 + bare.max_distance
