@@ -105,8 +105,6 @@ def _prepare(scan: SemanticScan, asked: SgorConfig, given: Given | None,
     scale = asked.scale or 1.0
     config, points, labels, warnings, cloud, ranges = _gridded(scan, convention, asked, scale,
                                                                 clock)
-    if rounded := rounding_warning(scan):
-        warnings.append(rounded)
     if asked.scale == 0:
         with clock('voxel grid'):
             even = cloud if config.voxel_size == STREET_VOXEL else voxel_grid(
@@ -115,6 +113,8 @@ def _prepare(scan: SemanticScan, asked: SgorConfig, given: Given | None,
         if scale != 1:
             config, points, labels, warnings, cloud, ranges = _gridded(
                 scan, convention, asked, scale, clock)
+    if rounded := rounding_warning(scan):
+        warnings.append(rounded)
     if len(cloud.points) > config.max_voxels:
         warnings.append(f'{len(cloud.points)} voxels thinned to {config.max_voxels}')
         cloud = cloud[thin(len(cloud.points), config.max_voxels)]

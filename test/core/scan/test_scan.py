@@ -194,3 +194,12 @@ def test_rounding_that_is_nothing_is_not_told():
         scan = SemanticScan(given)
         assert scan.rounding < 1e-5
         assert not any('float32' in w for w in preprocess(scan).warnings)
+
+
+def test_rounding_is_told_in_small_spaces_too():
+    """What is near is gridded a second time, at a scale of its own."""
+    rng = np.random.default_rng(0)
+    room, far = rng.uniform(-2, 2, (2000, 3)), rng.uniform(-2, 2, (3000, 3)) + 5.4e6
+    prepared = preprocess(SemanticScan(np.concatenate((room, far))))
+    assert prepared.scale < 1
+    assert any('float32' in w for w in prepared.warnings)
