@@ -138,7 +138,7 @@ class Lidar:
         labels : (N,) array of uint32
             Raw SemanticKITTI label of each point.
         times : (N,) array of float64
-            When each was fired, s since the start of the sweep. `motion.unbend` takes the bend out.
+            When each was fired, s since the start; `motion.unbend` takes the bend out.
         """
         directions, shares = self._pattern(rng)
         times = period * shares
@@ -199,7 +199,7 @@ class Lidar:
 
 
 def spherical(azimuth: Array, elevation: Array) -> Array:
-    """Unit vectors (R, 3) of angles that broadcast against each other, rad."""
+    """Return unit vectors (R, 3) of angles that broadcast against each other, rad."""
     azimuth, elevation = np.broadcast_arrays(azimuth, elevation)
     return np.stack([
         np.cos(elevation) * np.cos(azimuth),

@@ -29,7 +29,7 @@ class Rays(NamedTuple):
 
 
 def cast(scene: Scene, rays: Rays) -> tuple[Array, npt.NDArray[np.uint32], Array]:
-    """Range (R,), m, label (R,) and normal (R, 3) where rays meet the scene; a miss is infinite."""
+    """Find range (R,), m, infinite for a miss, label (R,) and normal (R, 3) of what rays meet."""
     lines = np.empty((len(rays.directions), 6), np.float32)
     lines[:, :3] = rays.origins
     lines[:, 3:] = rays.directions

@@ -56,7 +56,7 @@ def stairs(rng: np.random.Generator) -> Place:
 
 def _profile(rise: float, tread: float, steps: int, landing: float, flights: int
              ) -> tuple[Array, Array]:
-    """Ends (N + 1,) along x, 0 in the middle, and height (N,) of treads and landings, m."""
+    """Give ends (N + 1,) along x, 0 in the middle, and height (N,) of treads and landings, m."""
     flight = [tread] * (steps - 1)
     lengths = [_END, *([*flight, landing] * flights)[:-1], _END]
     edges: Array = np.concatenate([[0.0], np.cumsum(lengths)])
