@@ -21,7 +21,7 @@ Array = npt.NDArray[np.float64]
 
 _STEPS = ((0.17, 0.29, 12), (0.16, 0.31, 10), (0.18, 0.27, 12))
 """Rise and tread, m, and steps of a flight: standards, as in buildings."""
-_END = 8.0  # m, of the level floor at either end
+_END = 10.0  # m, of the level floor at either end
 _CEILING = 2.9  # m above the steps
 
 
@@ -38,7 +38,7 @@ def stairs(rng: np.random.Generator) -> Place:
     def ground(xy: Array) -> Array:
         return np.asarray(np.interp(xy[:, 0], knots, np.repeat(heights, 2)))
 
-    plot = Plot(rng, straight(edges[-1] - edges[0] - 8.0), ground)
+    plot = Plot(rng, straight(edges[-1] - edges[0] - 6.0), ground)
     plot.add(OTHER_GROUND, _across(np.repeat(edges, 2)[1:-1], np.repeat(heights, 2), half))
     plot.add(OTHER_STRUCTURE, _across(edges[[0, 1, -2, -1]],
                                       heights[[0, 0, -1, -1]] + _CEILING, half))
