@@ -22,8 +22,8 @@ from .features.features import Features
 from .features.semantic_context import context_classes
 from .features.semantic_context import semantic_context
 from .index.columns import in_columns
-from .index.range_image import AZIMUTHS
-from .index.range_image import ELEVATIONS
+from .scan.directions import AZIMUTHS
+from .scan.directions import ELEVATIONS
 from .index.scan_index import scan_index
 from .index.surface import Surface
 from .prepared_scan import PreparedScan

@@ -30,9 +30,11 @@ from .index.surface import surface
 from .prepared_scan import as_scan
 from .prepared_scan import Given
 from .prepared_scan import PreparedScan
+from .scan.directions import by_direction
 from .scan.ground import Ground
 from .scan.ground import printed_ground
 from .scan.ground import segment_ground
+from .scan.isolated_returns import not_isolated
 from .scan.labels import label_convention
 from .scan.labels import LabelConvention
 from .scan.point_filter import usable_points
@@ -150,9 +152,14 @@ def _gridded(scan: SemanticScan, convention: LabelConvention, asked: SgorConfig,
     config = asked.scaled(scale)
     with clock('voxel grid'):
         points, labels, warnings = usable_points(scan, convention, config)
+        rays = by_direction(points)
+        kept = np.ones(len(points), np.bool_)
+        if config.drop_isolated:
+            kept = not_isolated(rays, config.voxel_size)
+            points, labels = np.compress(kept, points, axis=0), labels[kept]
         cloud, ranges = run_both(
             config.threads, partial(voxel_grid, points, labels, config.voxel_size),
-            partial(range_image, points))
+            partial(range_image, rays, kept))
     return config, points, labels, warnings, cloud, ranges
 
 

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from ..common import se3
 from ..execution.threads import parallel_for
 from ..index.columns import window
-from ..index.range_image import direction
 from ..index.scan_index import ScanIndex
+from ..scan.directions import direction
 from ..scan.labels import UNLABELLED
 from ..scan.voxels import thin
 
