@@ -17,13 +17,13 @@ from .directions import Rays
 
 WINDOW = math.radians(3.0)
 """Width of what is around a direction: its cell and the 8 next to it."""
-SHARE = 0.1
+SHARE = 0.05
 """A surface of one voxel returns this share of the rays that pass through its place, or more."""
-MOST = 8
+MOST = 6
 """So many others at the same range are a surface in any case."""
 ALONE = 4
 """More returns in a cell, within one voxel of each other and nothing else, are a surface too."""
-DEPTH_VOXELS, DEPTH_SHARE = 0.4, 0.01
+DEPTH_VOXELS, DEPTH_SHARE = 0.5, 0.01
 """How much the ranges of one surface differ: in voxels, and as a share of the range."""
 
 
