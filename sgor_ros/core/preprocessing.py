@@ -153,7 +153,7 @@ def _prepare(scan: SemanticScan, asked: SgorConfig, given: Given | None,
                            config.max_correspondence_distance, scan.origin)
     return PreparedScan(
         scan, asked, scale, features, ground, index,
-        Lazy(partial(_fixed_surface, points, labels, convention, config)), tuple(warnings),
+        Lazy(partial(_fixed_surface, scan, points, labels, convention, config)), tuple(warnings),
         clock.seconds, given, up)
 
 
@@ -199,14 +199,14 @@ def _segmented(scan: SemanticScan, cloud: VoxelCloud, points: NDArray[np.float32
     return cloud[keep], regional[keep], directions[keep], ground
 
 
-def _fixed_surface(points: NDArray[np.float32], labels: NDArray[np.uint8],
+def _fixed_surface(scan: SemanticScan, points: NDArray[np.float32], labels: NDArray[np.uint8],
                    convention: LabelConvention, config: SgorConfig) -> Surface | None:
     """Return the surface of all that stands still, on a grid that no other scan has."""
     cloud = voxel_grid(points, labels, config.voxel_size, shift_of(points))
     if len(cloud.points) > config.max_voxels:
         cloud = cloud[thin(len(cloud.points), config.max_voxels)]
     fixed = config.moving_vote | ~np.isin(cloud.labels, list(convention.movable))
-    return surface(cloud.points[fixed], config.voxel_size)
+    return surface(cloud.points[fixed], config.voxel_size, scan.origin)
 
 
 def _unmatched_classes(convention: LabelConvention, config: SgorConfig) -> list[int]:
