@@ -20,6 +20,10 @@ class Ablation(Settings):
 
     FOR_STUDIES: ClassVar[bool] = True
 
+    drop_isolated: bool = setting(
+        True, 'Leave out returns without others around them at the same range, rain, dust and '
+        'ghosts (beyond the paper)')
+
     # secondary ground segmentation (Sec. III-B, Eq. 2-3)
     secondary_ground: bool = setting(
         True, 'Segment the ground a second time by distance; false: by labels only (ablation 3)')

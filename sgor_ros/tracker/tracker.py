@@ -97,7 +97,9 @@ class Tracker:
         """Find the pose of a scan that is on time."""
         prepared = preprocess(
             scan, self.config,
-            scale_before=self._reference.prepared.scale if self._reference else None)
+            scale_before=self._reference.prepared.scale if self._reference else None,
+            up_before=self._up)
+        self._up = None if prepared.ground is None else prepared.ground.normal
         new = ScanAtWork(prepared, stamp_ns, [*warnings, *prepared.warnings],
                          dict(prepared.timings))
         if self._reference is None:
@@ -115,6 +117,7 @@ class Tracker:
     def _forget(self) -> None:
         self._keyframes = Keyframes()
         self._reference: Keyframe | None = None
+        self._up: Array | None = None
         self._motion = Motion.unknown(0, np.eye(4), np.zeros((6, 6)), self.tracker_config)
         self._track_id = self._tracks
         self._failures = 0

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from ..common import se3
 from ..execution.threads import parallel_for
 from ..index.columns import window
-from ..index.range_image import direction
 from ..index.scan_index import ScanIndex
+from ..scan.directions import direction
 from ..scan.labels import UNLABELLED
 from ..scan.voxels import thin
 
@@ -108,13 +108,13 @@ def _one_way(source: ScanIndex, target: ScanIndex, T: NDArray[np.float64], keypo
     parallel_for(_outcomes, outcomes.size, source.points[rows], source.labels[rows],
                  np.ascontiguousarray(T), columns.points, target.column_normals,
                  target.column_labels, columns.first, columns.ny, columns.low, columns.edge,
-                 target.ranges, reach, near * near, margin, outcomes)
+                 target.ranges, target.origin, reach, near * near, margin, outcomes)
     return outcomes
 
 
 @numba.njit(cache=True, nogil=True)
 def _outcomes(first, last, points, labels, T, others, normals,
-              other_labels, columns, ny, low, edge, ranges, reach, limit, margin, outcomes):
+              other_labels, columns, ny, low, edge, ranges, origin, reach, limit, margin, outcomes):
     for task in range(first, last):
         h, i = task // len(points), task % len(points)
         x = T[h, 0, 0] * points[i, 0] + T[h, 0, 1] * points[i, 1] + T[h, 0, 2] * points[i, 2] \
@@ -127,6 +127,7 @@ def _outcomes(first, last, points, labels, T, others, normals,
                        reach, limit):
             outcomes[h, i] = AGREES
             continue
+        x, y, z = x - origin[0], y - origin[1], z - origin[2]
         r = math.sqrt(x * x + y * y + z * z)
         if r > 0:
             a, e = direction(np.float32(x), np.float32(y), np.float32(z))
