@@ -16,6 +16,9 @@ Figures are those of the makers' data sheets and manuals:
 Where a sheet gives a range by reflectivity, it is that of a bright target (80 %), for Pandar64 and
 Avia of a dark one (10 %). A sheet does not say which share of the returns is lost: it is that of
 `Lidar`. Noise is one standard deviation at a middle range.
+
+Checked against published copies: the elevations of all but Avia, the ranges of VLP-16, HDL-32E,
+OS1-64 and Mid-360, the noise of OS1-64 and Mid-360. The other figures are as commonly quoted.
 """
 
 from __future__ import annotations
