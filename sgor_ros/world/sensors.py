@@ -1,8 +1,8 @@
 """Sensors that are sold, by name.
 
-Figures are those of the makers' data sheets and manuals:
+Figures are meant to be those of the makers' data sheets and manuals:
 
-- VLP-16: Velodyne, VLP-16 User Manual 63-9243: 16 beams 2 deg apart, 0.2 deg at 10 Hz.
+- VLP-16: Velodyne, VLP-16 User Manual: 16 beams 2 deg apart, 0.2 deg at 10 Hz.
 - HDL-32E: Velodyne, HDL-32E User's Manual, table of vertical angles; 0.05 to 100 m, 2 cm.
 - HDL-64E: the defaults of `Lidar`, equally spaced beams.
 - OS0, OS1, OS2: Ouster, data sheets of revision 6: uniform spacing over 90, 45 and 22.5 deg,
@@ -17,8 +17,9 @@ Where a sheet gives a range by reflectivity, it is that of a bright target (80 %
 Avia of a dark one (10 %). A sheet does not say which share of the returns is lost: it is that of
 `Lidar`. Noise is one standard deviation at a middle range.
 
-Checked against published copies: the elevations of all but Avia, the ranges of VLP-16, HDL-32E,
-OS1-64 and Mid-360, the noise of OS1-64 and Mid-360. The other figures are as commonly quoted.
+Looked up: elevations (HDL-32E and OS1-64 in the maker's own sheet, VLP-16, XT-32, Mid-360, OS0,
+OS2 and Pandar64 in what others publish of them); ranges of HDL-32E, OS1-64 and Mid-360; noise of
+OS1-64 and Mid-360; the 70.4 deg of Avia. Other figures are as commonly quoted, not looked up.
 """
 
 from __future__ import annotations
