@@ -66,7 +66,7 @@ def _judge(begin, end, first, ranges, voxel, order, kept):
                 around += first[row + high + 1] - first[row + low]
             for i in range(first[cell], first[cell + 1]):
                 part = min(1.0, (voxel / (ranges[i] * WINDOW + 1e-9))**2)
-                needed = min(max(int(round(SHARE * part * around)), 1), MOST)
+                needed = min(max(round(SHARE * part * around), 1), MOST)
                 kept[order[i]] = _has_neighbours(
                     ranges[i], DEPTH_VOXELS * voxel + DEPTH_SHARE * ranges[i], azimuth, cell, low,
                     high, needed, first, ranges)

@@ -114,7 +114,8 @@ def _one_way(source: ScanIndex, target: ScanIndex, T: NDArray[np.float64], keypo
 
 @numba.njit(cache=True, nogil=True)
 def _outcomes(first, last, points, labels, T, others, normals,
-              other_labels, columns, ny, low, edge, ranges, origin, reach, limit, margin, outcomes):
+              other_labels, columns, ny, low, edge, ranges, origin, reach, limit, margin,
+              outcomes):
     for task in range(first, last):
         h, i = task // len(points), task % len(points)
         x = T[h, 0, 0] * points[i, 0] + T[h, 0, 1] * points[i, 1] + T[h, 0, 2] * points[i, 2] \
