@@ -11,7 +11,8 @@ from .common.settings import setting
 from .common.settings import Value
 
 PAPER_STEPS: dict[str, Value] = {
-    'drop_isolated': False, 'labelled_ground': True, 'robust_ground': False, 'drop_ground_labels': 'point',
+    'drop_isolated': False, 'labelled_ground': True, 'robust_ground': False,
+    'drop_ground_labels': 'point',
     'sampled_keypoints': True, 'quick_keypoints': 0, 'match_within_labels': False,
     'unlabelled_attempt': False, 'height_gate': 0.0, 'context_weight': 0.0, 'moving_vote': True,
     'weight_cutoff': 6.0, 'cloud_check': False, 'refinement_rounds': 1,
@@ -128,8 +129,8 @@ class SgorConfig(Ablation):
 
 
 PREPARATION = (
-    'label_convention', 'min_range', 'max_range', 'drop_isolated', 'voxel_size', 'max_voxels', 'sigma_g',
-    'secondary_ground', 'labelled_ground', 'robust_ground', 'ground_radius', 'min_ground_points',
+    'label_convention', 'min_range', 'max_range', 'drop_isolated', 'voxel_size', 'max_voxels',
+    'sigma_g',    'secondary_ground', 'labelled_ground', 'robust_ground', 'ground_radius', 'min_ground_points',
     'correspondence_preprocessing', 'drop_ground_labels', 'normal_radius', 'descriptor_radius',
     'vote_radius', 'context_weight', 'context_scale', 'moving_vote',
     'max_correspondence_distance')
