@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from sgor_ros.core.common import se3
+from sgor_ros.core.hypotheses.map_correlation import _normal_space_sample
 from sgor_ros.core.hypotheses.map_correlation import _peaks
 from sgor_ros.core.hypotheses.map_correlation import _quarter
 from sgor_ros.core.hypotheses.map_correlation import correlate_maps
@@ -139,3 +140,16 @@ def test_peaks_are_the_highest_and_none_is_next_to_another():
                                       (1, 3, 2)]
     assert _peaks(hits.copy(), (2, 0)) == [(0, 0, 0), (0, 2, 2)]
     assert _peaks(np.zeros((4, 3, 3), np.int32), (4, 4, 4, 4)) == []
+
+
+def test_normal_space_sampling_by_hand():
+    """10 of 3, 7 and 90: all of the few, what they leave is for the others; in order."""
+    sectors = np.repeat([5, 0, 2], [90, 3, 7])
+    for most, counts in ((10, (3, 3, 4)), (30, (3, 7, 20)), (2, (0, 1, 1)), (200, (3, 7, 90))):
+        rows = _normal_space_sample(sectors, most)
+        assert (np.diff(rows) > 0).all()
+        found = tuple(int((sectors[rows] == sector).sum()) for sector in (0, 2, 5))
+        assert sum(found) == min(most, 100)
+        if most > 2:
+            assert found == counts
+    assert _normal_space_sample(sectors[:0], 10).shape == (0,)
