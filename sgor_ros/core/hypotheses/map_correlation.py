@@ -70,7 +70,7 @@ def _normal_space_sample(sectors: NDArray[np.int64], most: int) -> NDArray[np.in
     for at in np.argsort(counts):    # what the small ones leave is for the others
         open_ = len(present) - int((share > 0).sum())
         share[at] = min(counts[at], -(-(most - share.sum()) // open_))
-    rows = [np.flatnonzero(sectors == sector)[thin(count, part)]
+    rows = [np.flatnonzero(sectors == sector)[thin(int(count), int(part))]
             for sector, count, part in zip(present, counts, share, strict=True) if part]
     return np.sort(np.concatenate(rows)) if rows else np.zeros(0, np.intp)
 
