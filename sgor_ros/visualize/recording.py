@@ -1,6 +1,7 @@
 """Where it goes, a file or a viewer, and what all views draw alike."""
 import logging
 from pathlib import Path
+import threading
 from types import TracebackType
 from typing import Self
 
@@ -77,7 +78,11 @@ class Recording:
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
                  trace: TracebackType | None) -> None:
         self.send()
-        self.stream.disconnect()
+        if self.broken:
+            # rerun waits for ever for a viewer that takes nothing
+            threading.Thread(target=self.stream.disconnect, daemon=True).start()
+        else:
+            self.stream.disconnect()
 
     def send(self) -> None:
         """Send what was logged; to be called often enough that no queue of rerun gets full."""
