@@ -22,12 +22,12 @@ from .features.features import Features
 from .features.semantic_context import context_classes
 from .features.semantic_context import semantic_context
 from .index.columns import in_columns
-from .scan.directions import AZIMUTHS
-from .scan.directions import ELEVATIONS
 from .index.scan_index import scan_index
 from .index.surface import Surface
 from .prepared_scan import PreparedScan
 from .preprocessing import fpfh_descriptors
+from .scan.directions import AZIMUTHS
+from .scan.directions import ELEVATIONS
 from .scan.ground import Ground
 from .scan.labels import label_convention
 

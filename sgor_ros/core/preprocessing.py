@@ -181,7 +181,8 @@ def _segmented(scan: SemanticScan, cloud: VoxelCloud, points: NDArray[np.float32
                ) -> tuple[VoxelCloud, NDArray[np.uint8], NDArray[np.float64], Ground | None]:
     """Return the voxels that may be matched, their regional labels and normals; the ground."""
     with clock('ground'):
-        ground = (segment_ground(cloud, convention.ground, config, up, scan.origin) if config.robust_ground else
+        ground = (segment_ground(cloud, convention.ground, config, up, scan.origin)
+                  if config.robust_ground else
                   printed_ground(cloud, points, labels, convention.ground, config))
         if ground is not None and config.correspondence_preprocessing:
             cloud = cloud[~ground.mask]

@@ -65,7 +65,8 @@ def surface(points: NDArray[np.float64], edge: float,
     normals = np.zeros((len(points), 3))
     parallel_for(_normals, len(points), columns.points, columns.first, columns.ny, columns.low,
                  columns.edge, origin, normals)
-    middle = float(np.median(np.sqrt(np.einsum('ij,ij->i', points, points))))
+    rays = points - origin
+    middle = float(np.median(np.sqrt(np.einsum('ij,ij->i', rays, rays))))
     return Surface(columns, normals, middle)
 
 

@@ -20,7 +20,8 @@ ALONG, LEAST_GROUND = np.cos(np.radians(30.0)), 0.05
 """A plane across the axis that is held to be vertical, by this cosine, is the ground before any
 other, if it holds this share of the points near the sensor."""
 CLEARLY = 2.0
-"""So many times the score of any plane of another direction makes the ground certain."""
+"""So many times the score of any plane of another direction makes a ground across the sensor's
+axis certain."""
 
 @dataclass(frozen=True)
 class Ground:
@@ -235,4 +236,5 @@ def _most_likely(normals: NDArray[np.float64], score: NDArray[np.intp], asked: i
         # the axis need not be exact: it may be a tilted copy of a better one
         best = int(np.argmax(np.where(np.abs(normals @ normals[best]) > ALONG, score, 0)))
     others = score[np.abs(normals @ normals[best]) < ALONG].max(initial=0)
-    return best, (up is not None and up.told) or bool(score[best] >= CLEARLY * others)
+    upright = abs(normals[best, 2]) > ALONG and bool(score[best] >= CLEARLY * others)
+    return best, upright or (up is not None and up.told)

@@ -17,6 +17,8 @@ from .directions import Rays
 
 WINDOW = math.radians(3.0)
 """Width of what is around a direction: its cell and the 8 next to it."""
+FEW = 3
+"""Where a surface of one voxel would have caught fewer rays, one return may be all of it."""
 SHARE = 0.05
 """A surface of one voxel returns this share of the rays that pass through its place, or more."""
 MOST = 6
@@ -65,8 +67,11 @@ def _judge(begin, end, first, ranges, voxel, order, kept):
                 row = (azimuth + step) % AZIMUTHS * ELEVATIONS
                 around += first[row + high + 1] - first[row + low]
             for i in range(first[cell], first[cell + 1]):
-                part = min(1.0, (voxel / (ranges[i] * WINDOW + 1e-9))**2)
-                needed = min(max(int(round(SHARE * part * around)), 1), MOST)
+                expected = around * min(1.0, (voxel / (ranges[i] * WINDOW + 1e-9))**2)
+                if expected < FEW:
+                    kept[order[i]] = True
+                    continue
+                needed = min(max(round(SHARE * expected), 1), MOST)
                 kept[order[i]] = _has_neighbours(
                     ranges[i], DEPTH_VOXELS * voxel + DEPTH_SHARE * ranges[i], azimuth, cell, low,
                     high, needed, first, ranges)
