@@ -62,6 +62,11 @@ class Tracker:
         self._stamps = Stamps()
         self._forget()
 
+    @property
+    def reference(self) -> Keyframe | None:
+        """What the next scan is registered to: the last scan itself where it became a keyframe."""
+        return self._reference
+
     def track(self, scan: SemanticScan, stamp_ns: int) -> TrackedScan:
         """Take the next scan.
 
