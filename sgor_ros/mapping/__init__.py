@@ -1,9 +1,9 @@
 """Loops and a pose graph on top of the tracker, without ROS and without files.
 
 `mapper` is the way of one scan. Beside it: `odometry` (nodes and edges out of tracked scans),
-`keyframe` (what is kept of a scan, and which are kept), `retrieval` (which look alike),
-`candidates` (which pairs to try and when), `loop_consistency` (which loops to believe; by `paths`,
-the surest way between two nodes), `pose_graph` (GTSAM), `edge` and `result` (what goes in and out).
+`keyframe` (what is kept of a scan), `retrieval` (which look alike), `candidates` (which pairs to
+try and when), `loop_consistency` (which loops to believe, by `paths`: the surest way between two
+nodes), `pose_graph` (GTSAM), `edge` and `result` (what goes in and out).
 """
 from .config import MapperConfig
 from .mapper import Mapper

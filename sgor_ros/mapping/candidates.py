@@ -2,6 +2,7 @@
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,9 +18,9 @@ Array = NDArray[np.float64]
 
 SIGMAS = 3.0
 """So many standard deviations of the position are searched beyond the radius."""
-ROUND_ABOUT = 2.0
-"""Neighbours are reached by driving straight there; a loop comes by a way that is longer by this
-factor, and by two keyframes."""
+ROUND_ABOUT = 2
+"""To a neighbour one drives straight; to a loop leads a way that is longer by so many keyframes.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,10 +48,10 @@ class Candidates:
     def __len__(self) -> int:
         return sum(len(targets) for *_, targets in self._waiting)
 
-    def add(self, node: Node, prepared: PreparedScan, targets: list[int], limit: int) -> None:
+    def add(self, source: int, prepared: PreparedScan, targets: list[int], limit: int) -> None:
         """Let the pairs of a new node wait, best first."""
         if targets:
-            self._waiting.append((node.id, prepared, deque(targets)))
+            self._waiting.append((source, prepared, deque(targets)))
         while len(self._waiting) > limit:
             self.put_off += len(self._waiting.popleft()[2])
 
@@ -64,51 +65,66 @@ class Candidates:
             self._waiting.pop()
         return candidate
 
-    def done(self, source: int) -> None:
-        """Drop what is left of a scan: it is placed."""
-        self._waiting = deque(one for one in self._waiting if one[0] != source)
 
+@dataclass(frozen=True, eq=False)
+class Surroundings:
+    """What is near a new node, as far as its pose is sure.
 
-def candidates_of(node: Node, prepared: PreparedScan, keyframes: Keyframes, graph: PoseGraph,
-                  paths: Paths, nodes: Mapping[int, Node], config: MapperConfig) -> list[int]:
-    """Return the keyframes to try for a new node, best first."""
-    sigmas = paths.sigmas(node.id)
-    radius = config.loop_radius * prepared.scale
-    near: list[tuple[float, int]] = []
-    elsewhere = set[int]()
-    for keyframe in keyframes:
-        if graph.part(keyframe.id) != graph.part(node.id):
-            elsewhere.add(keyframe.id)
-            continue
-        distance = _distance(graph, node.id, keyframe.id)
-        way = abs(node.way - nodes[keyframe.id].way)
-        if way < ROUND_ABOUT * (distance + config.keyframe_spacing * prepared.scale):
-            continue
-        sigma = sigmas.get(keyframe.id, np.inf)
-        if distance < radius + SIGMAS * sigma:
-            near.append((distance, keyframe.id))
+    Attributes
+    ----------
+    node : Node
+    prepared : PreparedScan
+    keyframes : Keyframes
+    graph : PoseGraph
+    paths : Paths
+    config : MapperConfig
+    """
+
+    node: Node
+    prepared: PreparedScan
+    keyframes: Keyframes
+    graph: PoseGraph
+    paths: Paths
+    config: MapperConfig
+
+    def candidates(self, nodes: Mapping[int, Node]) -> list[int]:
+        """Return the keyframes to try for the node, best first."""
+        c, scale = self.config, self.prepared.scale
+        radius, straight = c.loop_radius * scale, ROUND_ABOUT * c.keyframe_spacing * scale
+        near: list[tuple[float, int]] = []
+        elsewhere = set(self._others)
+        for other, distance, sigma in self._distances:
+            way = abs(self.node.way - nodes[other].way)
+            if way < distance + straight or distance > radius + SIGMAS * sigma:
+                continue
+            near.append((distance, other))
             if SIGMAS * sigma > radius:    # then nearness says little
-                elsewhere.add(keyframe.id)
-    chosen = [keyframe for _, keyframe in sorted(near)][:config.near_candidates]
-    if elsewhere:
-        alike = [other for other in keyframes.alike(prepared) if other in elsewhere]
-        chosen = [*alike[:config.alike_candidates], *chosen]
-    return list(dict.fromkeys(chosen))
+                elsewhere.add(other)
+        chosen = [other for _, other in sorted(near)][:c.near_candidates]
+        if elsewhere:
+            alike = [other for other in self.keyframes.alike(self.prepared) if other in elsewhere]
+            chosen = [*alike[:c.alike_candidates], *chosen]
+        return list(dict.fromkeys(chosen))
 
+    def is_covered(self) -> bool:
+        """Return whether a keyframe stands so near that another would add nothing."""
+        spacing = self.config.keyframe_spacing * self.prepared.scale
+        return any(distance < spacing and sigma < spacing / 2
+                   for _, distance, sigma in self._distances)
 
-def is_covered(node: Node, keyframes: Keyframes, graph: PoseGraph, paths: Paths, spacing: float
-               ) -> bool:
-    """Return whether a keyframe stands so near that another would add nothing."""
-    near = {keyframe.id for keyframe in keyframes
-            if graph.part(keyframe.id) == graph.part(node.id)
-            and _distance(graph, node.id, keyframe.id) < spacing}
-    if not near:
-        return False
-    sigmas = paths.sigmas(node.id)
-    return any(sigmas[other] < spacing / 2 for other in near)
+    @cached_property
+    def _others(self) -> list[int]:
+        """Keyframes of other parts of the map."""
+        part = self.graph.part(self.node.id)
+        return [one.id for one in self.keyframes if self.graph.part(one.id) != part]
 
-
-def _distance(graph: PoseGraph, one: int, other: int) -> float:
-    return float(np.linalg.norm(graph.poses[one][:3, 3] - graph.poses[other][:3, 3]))
-
-
+    @cached_property
+    def _distances(self) -> list[tuple[int, float, float]]:
+        """Keyframes of the same part, with their distance and its standard deviation, metres."""
+        part = self.graph.part(self.node.id)
+        ids = [one.id for one in self.keyframes if self.graph.part(one.id) == part]
+        if not ids:
+            return []
+        ways = self.graph.poses(ids)[:, :3, 3] - self.graph.pose(self.node.id)[:3, 3]
+        return list(zip(ids, np.linalg.norm(ways, axis=1).tolist(),
+                        self.paths.sigmas(self.node.id, ids).tolist(), strict=True))

@@ -74,8 +74,6 @@ def chained(edges: list[Edge]) -> tuple[Array, Array]:
 
 
 def squared_distance(T: Array, other: Array, covariance: Array) -> float:
-    """Return the squared Mahalanobis distance of two (4, 4) poses, whose difference has a (6, 6)
-    covariance.
-    """
+    """Return the squared Mahalanobis distance of two (4, 4) poses, by that of their difference."""
     d = se3.perturbation(T, other)
     return float(d @ np.linalg.solve(covariance, d))

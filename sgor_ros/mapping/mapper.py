@@ -1,6 +1,6 @@
 """The way of a scan through the mapper, on one screen."""
 from dataclasses import fields
-import logging
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,15 +9,16 @@ from ..core.common import se3
 from ..core.config import prepares_alike
 from ..core.config import SgorConfig
 from ..core.prepared_scan import PreparedScan
+from ..core.preprocessing import preprocess
 from ..core.registration import register
 from ..core.scan.scan import SemanticScan
+from ..tracker import State
 from ..tracker import TrackedScan
 from ..tracker import Tracker
 from ..tracker import TrackerConfig
 from .candidates import Candidate
 from .candidates import Candidates
-from .candidates import candidates_of
-from .candidates import is_covered
+from .candidates import Surroundings
 from .config import MapperConfig
 from .edge import Edge
 from .edge import Kind
@@ -32,19 +33,25 @@ from .result import Trajectory
 
 Array = NDArray[np.float64]
 
-LOGGER = logging.getLogger('sgor_ros')
+NOWHERE = -1
+"""In place of the node of a scan that has none."""
 
 
 class Mapper:
     """Tracks each scan, closes loops among keyframes, and keeps all poses optimised.
+
+    Without GTSAM it goes on as odometry, and says so once.
 
     Attributes
     ----------
     tracker : Tracker
     mapper_config : MapperConfig
     graph : PoseGraph
+        A node for each keyframe of the tracker.
     keyframes : Keyframes
+        Those of them whose scans are kept.
     consistency : LoopConsistency
+    candidates : Candidates
     """
 
     def __init__(self, config: SgorConfig | None = None,
@@ -55,60 +62,119 @@ class Mapper:
         self.graph = PoseGraph()
         self.keyframes = Keyframes()
         self.consistency = LoopConsistency()
+        self.candidates = Candidates()
         self._odometry = Odometry()
-        self._candidates = Candidates()
+        self._closes_loops = bool(self.mapper_config.registrations_per_scan
+                                  and not self.graph.missing)
+        self._notes = [self.graph.missing] if self.graph.missing else []
 
     def track(self, scan: SemanticScan, stamp_ns: int) -> MappedScan:
-        """Take the next scan: its pose by odometry, and the loops that it closed."""
+        """Take the next scan: its pose by odometry, and the loops that it closed.
+
+        Parameters
+        ----------
+        scan : SemanticScan
+        stamp_ns : int
+            Its stamp, nanoseconds, as of `Tracker.track`.
+        """
         tracked = self.tracker.track(scan, stamp_ns)
+        if tracked.state in (State.FAILED, State.LOST) and self._is_elsewhere(scan):
+            self.tracker.begin_track()
+            self._notes.append('the sensor is at another place of the map: a new track begins')
         keyframe = self.tracker.reference if tracked.keyframe else None
         return self.add(tracked, None if keyframe is None else keyframe.prepared)
 
     def add(self, tracked: TrackedScan, prepared: PreparedScan | None) -> MappedScan:
         """Take a scan that has been tracked; prepared, where the tracker made a keyframe of it."""
         if tracked.T_odom_sensor is not None:
+            T_map_sensor = self._odometry.last_pose(self.graph)
             added = self._odometry.add(tracked, self.tracker.tracker_config)
             if added is not None:
-                assert prepared is not None
-                self._add_node(*added, prepared)
+                assert prepared is not None, 'a keyframe comes with its prepared scan'
+                self._add_node(*added, prepared, T_map_sensor)
         loops = self._work()
-        return MappedScan(**{item.name: getattr(tracked, item.name) for item in fields(tracked)},
+        notes, self._notes = self._notes, []
+        told = {item.name: getattr(tracked, item.name) for item in fields(tracked)}
+        return MappedScan(**{**told, 'warnings': (*tracked.warnings, *notes)},
                           loops=tuple(self._loop_of(edge) for edge in loops),
                           T_map_odom=self._T_map_odom(tracked))
 
+    def offer(self, loop: Loop) -> tuple[Loop, ...]:
+        """Take a loop from elsewhere; return those that are believed now that there is one more.
+
+        Raises
+        ------
+        InputError
+            One of its stamps is of no keyframe.
+        """
+        source, target = (self._odometry.node_at(stamp_ns) for stamp_ns in (
+            loop.source_stamp_ns, loop.target_stamp_ns))
+        edge = Edge(target, source, loop.T_target_source, loop.covariance, Kind.LOOP)
+        return tuple(self._loop_of(closed) for closed in self._offer([edge]))
+
     def trajectory(self) -> Trajectory:
         """Return the optimised pose of every scan that has one."""
-        return self._odometry.trajectory(
-            self.graph.poses, {node: self.graph.part(node) for node in self.graph.poses})
+        return self._odometry.trajectory(self.graph)
 
-    def _add_node(self, node: Node, edge: Edge | None, prepared: PreparedScan) -> None:
+    def _add_node(self, node: Node, edge: Edge | None, prepared: PreparedScan,
+                  T_map_sensor: Array) -> None:
+        """Put a node into the graph, and let its candidates wait; an origin is put where it is."""
         c = self.mapper_config
         if edge is None:
-            self.graph.add_origin(node.id, np.eye(4))
+            self.graph.add_origin(node.id, T_map_sensor)
         else:
             self.graph.add_node(edge)
             self.consistency.paths.add(edge)
-        if c.registrations_per_scan:
-            self._candidates.add(node, prepared, candidates_of(
-                node, prepared, self.keyframes, self.graph, self.consistency.paths,
-                self._odometry.nodes, c), c.waiting)
-        if not is_covered(node, self.keyframes, self.graph, self.consistency.paths,
-                          c.keyframe_spacing * prepared.scale):
+        if not self._closes_loops:
+            return
+        place = Surroundings(node, prepared, self.keyframes, self.graph, self.consistency.paths, c)
+        self.candidates.add(node.id, prepared, place.candidates(self._odometry.nodes), c.waiting)
+        if not place.is_covered():
             self.keyframes.add(node.id, node.stamp_ns, node.track_id, prepared)
+
+    def _is_elsewhere(self, scan: SemanticScan) -> bool:
+        """Whether a scan that the tracker cannot place is at a place of the map, and far from it.
+
+        It has to be registered to two keyframes that agree with each other: a kidnapped sensor.
+        """
+        count = self.mapper_config.registrations_per_scan
+        if not self._closes_loops or not len(self.keyframes):
+            return False
+        prepared = preprocess(scan, self.tracker.config)
+        alike = self.keyframes.alike(prepared)[:count]
+        found = [loop for target in alike if (
+            loop := self._registered(Candidate(NOWHERE, prepared, target))) is not None]
+        if not any(self.consistency.agree(*pair) for pair in combinations(found, 2)):
+            return False
+        at = self.graph.pose(found[0].target) @ found[0].T_target_source
+        way = at[:3, 3] - self._odometry.last_pose(self.graph)[:3, 3]
+        return float(np.linalg.norm(way)) > self.mapper_config.loop_radius * prepared.scale
 
     def _work(self) -> list[Edge]:
         """Register candidates, as many as there is time for; return the loops believed now."""
-        closed: list[Edge] = []
+        found: list[Edge] = []
         for _ in range(self.mapper_config.registrations_per_scan):
-            candidate = self._candidates.next()
+            candidate = self.candidates.next()
             if candidate is None:
                 break
             loop = self._registered(candidate)
             if loop is not None:
-                self._candidates.done(candidate.source)
-                closed += self.consistency.offer(loop, self.mapper_config)
+                found.append(loop)
+        return self._offer(found)
+
+    def _offer(self, loops: list[Edge]) -> list[Edge]:
+        """Return the loops that are believed now, closed in the graph."""
+        closed = [edge for loop in loops
+                  for edge in self.consistency.offer(loop, self.mapper_config)]
         if closed:
             self.graph.close(closed)
+        if self.consistency.in_question():
+            before = {id(edge) for edge in self.graph.loops}
+            kept = self.graph.without_outliers([*self.graph.loops,
+                                                *self.consistency.contradicting])
+            self.graph.replace_loops(kept)
+            self.consistency.begin_anew(self.graph.edges)
+            closed += [edge for edge in kept if id(edge) not in before]
         return closed
 
     def _registered(self, candidate: Candidate) -> Edge | None:
@@ -132,4 +198,4 @@ class Mapper:
         if tracked.T_odom_sensor is None:
             return None
         node = self._odometry.last(tracked.track_id)
-        return self.graph.poses[node.id] @ se3.inverse(node.T_odom_sensor)
+        return self.graph.pose(node.id) @ se3.inverse(node.T_odom_sensor)

@@ -1,21 +1,22 @@
 """From tracked scans to nodes and odometry edges of the graph, and back to a pose of each scan."""
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..core.common import se3
+from ..core.common.settings import InputError
 from ..tracker import TrackedScan
 from ..tracker import TrackerConfig
 from ..tracker.choice import UNKNOWN_COVARIANCE
 from .edge import Edge
+from .pose_graph import PoseGraph
 from .result import Trajectory
 
 Array = NDArray[np.float64]
 
-LEAST_SIGMA = np.array([1e-3] * 3 + [1e-4] * 3)
-"""Standard deviations that no edge goes below, metres and radians: a covariance has to be one."""
+LEAST = np.diag([1e-3**2] * 3 + [1e-4**2] * 3)
+"""What no edge goes below, m^2 and rad^2: a covariance has to be one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,47 +85,73 @@ class Odometry:
         node = Node(tracked.keyframe_id, tracked.stamp_ns, track, T, tracked.covariance, self._way)
         self.nodes[node.id] = self._last[track] = node
         self._hang(tracked.stamp_ns, node.id, np.eye(4))
-        return node, None if on is None else edge_between(on, node)
+        return node, None if on is None else edge_between(on, node, (
+            tracked.reference_covariance if on.id == tracked.reference_id else None))
 
     def last(self, track_id: int) -> Node:
         """Return the newest node of a track."""
         return self._last[track_id]
+
+    def last_pose(self, graph: PoseGraph) -> Array:
+        """Return T_map_sensor of the last scan that has a pose; the origin before the first."""
+        if not self._anchors:
+            return np.eye(4)
+        return graph.pose(self._anchors[-1]) @ self._T_anchor_sensor[-1]
+
+    def node_at(self, stamp_ns: int) -> int:
+        """Return the node of a stamp.
+
+        Raises
+        ------
+        InputError
+            There is none.
+        """
+        for node in self.nodes.values():
+            if node.stamp_ns == stamp_ns:
+                return node.id
+        raise InputError(f'stamp_ns = {stamp_ns}: that of no keyframe')
 
     def _hang(self, stamp_ns: int, node: int, T_node_sensor: Array) -> None:
         self._stamps_ns.append(stamp_ns)
         self._anchors.append(node)
         self._T_anchor_sensor.append(T_node_sensor)
 
-    def trajectory(self, poses: Mapping[int, Array], parts: Mapping[int, int]) -> Trajectory:
-        """Return the pose of each scan in the map, where those of the nodes are given."""
-        T_map_anchor = np.array([poses[node] for node in self._anchors]).reshape(-1, 4, 4)
+    def trajectory(self, graph: PoseGraph) -> Trajectory:
+        """Return the pose of each scan in the map."""
+        anchors, rows = np.unique(np.array(self._anchors, np.int64), return_inverse=True)
+        nodes = anchors.tolist()
         T_anchor_sensor = np.array(self._T_anchor_sensor).reshape(-1, 4, 4)
-        return Trajectory(np.array(self._stamps_ns, np.int64), T_map_anchor @ T_anchor_sensor,
-                          np.array([parts[node] for node in self._anchors], np.int64))
+        return Trajectory(
+            np.array(self._stamps_ns, np.int64), graph.poses(nodes)[rows] @ T_anchor_sensor,
+            np.array([graph.part(node) for node in nodes], np.int64)[rows])
 
 
-def edge_between(target: Node, source: Node) -> Edge:
+def edge_between(target: Node, source: Node, step: Array | None = None) -> Edge:
     """Return the odometry edge of two nodes of a track, the source being the later.
 
     Its covariance is by how much that of the pose has grown between them. Errors that repeat from
     step to step are in it with all that they add to those before, so that edges may be counted as
-    independent of each other.
+    independent of each other. It never goes below `step`, (6, 6), that of the registration of one
+    to the other, where there was one: on a way back errors that repeat undo those before.
     """
     T = se3.inverse(target.T_odom_sensor) @ source.T_odom_sensor
-    covariance = UNKNOWN_COVARIANCE
-    if target.covariance is not None and source.covariance is not None:
+    if target.covariance is None or source.covariance is None:
+        covariance = UNKNOWN_COVARIANCE if step is None else step
+    else:
         carry = se3.carried(source.T_odom_sensor[:3, 3] - target.T_odom_sensor[:3, 3])
         back = se3.turned(target.T_odom_sensor[:3, :3].T)
-        growth = source.covariance - carry @ target.covariance @ carry.T
-        covariance = _at_least(back @ growth @ back.T)
+        growth = back @ (source.covariance - carry @ target.covariance @ carry.T) @ back.T
+        covariance = _at_least(growth, LEAST if step is None else step)
     return Edge(target.id, source.id, T, covariance)
 
 
-def _at_least(covariance: Array) -> Array:
-    """Return a symmetric matrix made positive definite: what shrinks on a way back is left out."""
-    scale = np.outer(LEAST_SIGMA, LEAST_SIGMA)
-    values, vectors = np.linalg.eigh((covariance + covariance.T) / 2 / scale)
-    return np.asarray((vectors * np.maximum(values, 1.0)) @ vectors.T * scale)
+def _at_least(covariance: Array, least: Array) -> Array:
+    """Return a (6, 6) covariance that is widened where it is below another."""
+    root = np.linalg.cholesky(least)
+    back = np.linalg.inv(root)
+    values, vectors = np.linalg.eigh(back @ (covariance + covariance.T) @ back.T / 2)
+    widened = root @ (vectors * np.maximum(values, 1.0)) @ vectors.T @ root.T
+    return np.asarray((widened + widened.T) / 2)
 
 
 def _is_far(node: Node, T_odom_sensor: Array, config: TrackerConfig) -> bool:

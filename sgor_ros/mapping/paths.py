@@ -1,4 +1,6 @@
 """How two nodes lie to each other by the edges that are believed, along the surest way."""
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
@@ -19,25 +21,40 @@ class Paths:
     def __init__(self) -> None:
         self._row: dict[int, int] = {}
         self._edges: dict[tuple[int, int], Edge] = {}
+        # in the order of _edges: rows of both ends, and variances
+        self._ends: tuple[list[int], list[int]] = ([], [])
+        self._variances: list[float] = []
+        self._place: dict[tuple[int, int], int] = {}
         self._network: csr_array | None = None
         self._from: tuple[int, Array, Array] | None = None
 
     def add(self, edge: Edge) -> None:
         """Take one more edge; of two between the same nodes the surer one stays."""
         a, b = (self._row.setdefault(node, len(self._row)) for node in (edge.target, edge.source))
-        if (a, b) not in self._edges or _variance(edge) < _variance(self._edges[a, b]):
-            self._edges[a, b] = edge
-            self._edges[b, a] = edge.reversed()
+        self._put(a, b, edge)
+        self._put(b, a, edge.reversed())
         self._network = self._from = None
 
-    def sigmas(self, node: int) -> dict[int, float]:
-        """Return the standard deviation of the position of all nodes seen from one, metres.
+    def _put(self, a: int, b: int, edge: Edge) -> None:
+        variance = _variance(edge)
+        place = self._place.setdefault((a, b), len(self._variances))
+        if place == len(self._variances):
+            self._ends[0].append(a)
+            self._ends[1].append(b)
+            self._variances.append(variance)
+        elif self._variances[place] <= variance:
+            return
+        self._variances[place] = variance
+        self._edges[a, b] = edge
 
-        Roughly: turns count with one lever. Nodes that no way leads to are left out.
+    def sigmas(self, node: int, others: Sequence[int]) -> Array:
+        """Return the standard deviation of the position of others seen from a node, metres.
+
+        Roughly: turns count with one lever. Infinite where no way leads.
         """
         variances, _ = self._search(node)
-        return {other: float(np.sqrt(variances[row])) for other, row in self._row.items()
-                if np.isfinite(variances[row])}
+        return np.sqrt([variances[self._row[other]] if other in self._row else np.inf
+                        for other in others])
 
     def between(self, target: int, source: int) -> tuple[Array, Array] | None:
         """Return T_target_source with its covariance; None where no way leads there."""
@@ -58,9 +75,7 @@ class Paths:
         if node not in self._row:
             return np.full(count, np.inf), np.full(count, -1)
         if self._network is None:
-            ends = np.array(list(self._edges), np.int64)
-            lengths = [_variance(edge) for edge in self._edges.values()]
-            self._network = csr_array((lengths, (ends[:, 0], ends[:, 1])), (count, count))
+            self._network = csr_array((self._variances, self._ends), (count, count))
         variances, before = dijkstra(self._network, indices=self._row[node],
                                      return_predecessors=True)
         self._from = node, variances, before
@@ -68,4 +83,5 @@ class Paths:
 
 
 def _variance(edge: Edge) -> float:
-    return float(np.trace(edge.covariance[:3, :3]) + LEVER_M**2 * np.trace(edge.covariance[3:, 3:]))
+    of_position, of_rotation = edge.covariance[:3, :3], edge.covariance[3:, 3:]
+    return float(of_position.trace() + LEVER_M**2 * of_rotation.trace())

@@ -4,6 +4,7 @@ Errors of edges are as everywhere in this package, position and rotation each by
 target frame; GTSAM has rotation first, both in the frame of the source. See docs/pose_graph.md.
 """
 from collections.abc import Iterable
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 
 from ..core.common import se3
 from .edge import Edge
+from .edge import Kind
 
 Array = NDArray[np.float64]
 
@@ -18,6 +20,11 @@ ORIGIN_SIGMA = 1e-4
 """Metres and radians: the first node of a part stays where it is put."""
 RELINEARISE = 0.01
 """Metres and radians: nodes that have moved by more are linearised again."""
+INLIER_PROBABILITY = 0.997
+"""Share of right loops that GNC is to keep."""
+AT_THE_BOUND = 0.25
+"""Weight that Geman and McClure's loss leaves an edge whose error is at the bound of inliers."""
+INSTALL = "pip install 'sgor_ros[mapping]'"
 ROUNDS = 3
 """Updates after a loop; the estimate has settled then."""
 
@@ -25,70 +32,133 @@ ROUNDS = 3
 class PoseGraph:
     """Nodes with poses in the map, and the edges between them.
 
+    Without GTSAM nothing is optimised: poses are those of odometry, and loops are refused.
+
     Attributes
     ----------
     edges : list of Edge
         In the order that they came in.
-    poses : dict of int to (4, 4) float64
-        T_map_sensor of each node, optimised.
+    missing : str
+        Why there is no GTSAM; empty where there is.
     """
 
     def __init__(self) -> None:
-        self._gtsam = library()
         self.edges: list[Edge] = []
-        self.poses: dict[int, Array] = {}
-        self._part: dict[int, int] = {}
+        self.missing = ''
+        self._row: dict[int, int] = {}
+        self._poses = np.empty((0, 4, 4))
+        self._parent: list[int] = []
+        self._gtsam: Any = None
+        try:
+            self._gtsam = library()
+        except ImportError as error:
+            self.missing = f'loops are not closed: GTSAM is not installed ({error}); {INSTALL}'
         self._solver = self._new_solver()
 
+    def __len__(self) -> int:
+        return len(self._row)
+
+    @property
+    def nodes(self) -> list[int]:
+        """All nodes, in the order that they came in."""
+        return list(self._row)
+
+    @property
+    def loops(self) -> list[Edge]:
+        """The edges that are loops."""
+        return [edge for edge in self.edges if edge.kind is Kind.LOOP]
+
+    def pose(self, node: int) -> Array:
+        """Return T_map_sensor of a node, (4, 4)."""
+        T_map_sensor: Array = self._poses[self._row[node]]
+        return T_map_sensor
+
+    def poses(self, nodes: Sequence[int]) -> Array:
+        """Return T_map_sensor of some nodes, (N, 4, 4)."""
+        return self._poses[[self._row[node] for node in nodes]]
+
     def part(self, node: int) -> int:
-        """Return the first node of the part that a node is in."""
-        while self._part[node] != node:
-            self._part[node] = self._part[self._part[node]]
-            node = self._part[node]
-        return node
+        """Return the number of the connected part that a node is in."""
+        row = self._row[node]
+        while self._parent[row] != row:
+            row = self._parent[row]
+        self._parent[self._row[node]] = row
+        return row
 
     def add_origin(self, node: int, T_map_sensor: Array) -> None:
-        """Begin a part of its own."""
-        self._part[node] = node
-        self.poses[node] = T_map_sensor
-        self._update([self._prior(node)], [node])
+        """Begin a part of its own with a node at a pose."""
+        self._append(node, T_map_sensor, len(self._row))
+        self._update([self._prior(node)] if self._gtsam else [], [node])
 
     def add_node(self, edge: Edge) -> None:
         """Add the source of an edge, whose target is there already."""
         self.edges.append(edge)
-        self._part[edge.source] = self.part(edge.target)
-        self.poses[edge.source] = self.poses[edge.target] @ edge.T_target_source
-        self._update([self._factor(edge)], [edge.source])
+        self._append(edge.source, self.pose(edge.target) @ edge.T_target_source,
+                     self.part(edge.target))
+        self._update([self._factor(edge)] if self._gtsam else [], [edge.source])
 
-    def close(self, loops: Iterable[Edge]) -> None:
+    def close(self, loops: Sequence[Edge]) -> None:
         """Add edges between nodes that are there, and optimise. They may join parts."""
-        loops = list(loops)
-        joined = False
-        for loop in loops:
-            self.edges.append(loop)
-            joined |= self._join(loop)
-        if joined:    # nodes were moved, which iSAM2 cannot take in
-            self._solver = self._new_solver()
-            self._update([self._prior(node) for node in self._part if self._part[node] == node]
-                         + [self._factor(edge) for edge in self.edges], list(self.poses))
+        joined = [self._join(loop) for loop in loops]    # all of them, whatever the first says
+        self.edges += loops
+        if any(joined):    # nodes were moved, which iSAM2 cannot take in
+            self._begin_anew()
         else:
             self._update([self._factor(loop) for loop in loops], [])
-        for _ in range(ROUNDS - 1):
-            self._solver.update()
-        self._read(self._solver.calculateBestEstimate())
+        self._settle()
 
-    def replace_loops(self, loops: Iterable[Edge]) -> None:
-        """Forget all loops, and close these in their place."""
-        raise NotImplementedError
+    def without_outliers(self, loops: Sequence[Edge]) -> list[Edge]:
+        """Return those of some loops that hold together, by graduated non-convexity (GNC).
+
+        It takes seconds in a graph of thousands of nodes. Odometry counts as right.
+        """
+        steps = [edge for edge in self.edges if edge.kind is Kind.ODOMETRY]
+        origins = [self._prior(node) for node in self._origins()]
+        graph = self._gtsam.NonlinearFactorGraph()
+        for factor in (*origins, *(self._factor(edge) for edge in (*steps, *loops))):
+            graph.add(factor)
+        parameters = self._gtsam.GncLMParams()
+        # with known inliers its other loss, TLS, rejects all others
+        parameters.setLossType(self._gtsam.GncLossType.GM)
+        certain = len(origins) + len(steps)
+        parameters.setKnownInliers(list(range(certain)))
+        start, self._poses = self._poses, self._by_odometry()
+        solver = self._gtsam.GncLMOptimizer(graph, self._values(self.nodes), parameters)
+        self._poses = start
+        solver.setInlierCostThresholdsAtProbability(INLIER_PROBABILITY)
+        solver.optimize()
+        weights = solver.getWeights()[certain:]
+        return [loop for loop, weight in zip(loops, weights, strict=True)
+                if weight > AT_THE_BOUND]
+
+    def replace_loops(self, loops: Sequence[Edge]) -> None:
+        """Take some loops in place of those that are there, and optimise."""
+        self.edges = [edge for edge in self.edges if edge.kind is Kind.ODOMETRY]
+        self._poses = self._by_odometry()
+        self.edges += loops
+        self._begin_anew()
+        self._settle()
 
     def chi_squared(self) -> tuple[float, int]:
         """Return the sum of squared errors in standard deviations, and the degrees of freedom."""
         factors = self._gtsam.NonlinearFactorGraph()
         for edge in self.edges:
             factors.add(self._factor(edge))
-        parts = sum(self._part[node] == node for node in self._part)
-        return (2 * factors.error(self._values(self.poses)),
-                6 * (len(self.edges) - len(self.poses) + parts))
+        return (2 * factors.error(self._values(self.nodes)),
+                6 * (len(self.edges) - len(self) + len(self._origins())))
+
+    def _append(self, node: int, T_map_sensor: Array, part: int) -> None:
+        row = self._row[node] = len(self._row)
+        self._parent.append(part)
+        if row == len(self._poses):
+            grown = np.empty((max(64, 2 * row), 4, 4))
+            grown[:row] = self._poses
+            self._poses = grown
+        self._poses[row] = T_map_sensor
+
+    def _origins(self) -> list[int]:
+        """Return the first node of each part."""
+        return [node for node, row in self._row.items() if self._parent[row] == row]
 
     def _join(self, loop: Edge) -> bool:
         """Move one of two parts to where a loop has it; the later one, for maps begin early."""
@@ -98,40 +168,62 @@ class PoseGraph:
         if second < first:
             loop = loop.reversed()
             first, second = second, first
-        move = (self.poses[loop.target] @ loop.T_target_source
-                @ se3.inverse(self.poses[loop.source]))
-        for node in self._part:
-            if self.part(node) == second:
-                self.poses[node] = move @ self.poses[node]
-        self._part[second] = first
+        move = self.pose(loop.target) @ loop.T_target_source @ se3.inverse(self.pose(loop.source))
+        rows = [row for node, row in self._row.items() if self.part(node) == second]
+        self._poses[rows] = move @ self._poses[rows]
+        self._parent[second] = first
         return True
 
+    def _by_odometry(self) -> Array:
+        """Return the poses without loops, from where an optimiser finds its way."""
+        poses = self._poses.copy()
+        for edge in self.edges:
+            if edge.kind is Kind.ODOMETRY:
+                poses[self._row[edge.source]] = (poses[self._row[edge.target]]
+                                                 @ edge.T_target_source)
+        return poses
+
+    def _begin_anew(self) -> None:
+        """Build the solver again from all edges and the poses as they are."""
+        self._solver = self._new_solver()
+        self._update([*(self._prior(node) for node in self._origins()),
+                      *(self._factor(edge) for edge in self.edges)], self.nodes)
+
+    def _settle(self) -> None:
+        for _ in range(ROUNDS - 1):
+            self._solver.update()
+        values = self._solver.calculateBestEstimate()
+        # sorted by node: R row by row, then t
+        rows = self._gtsam.utilities.extractPose3(values)
+        at = [self._row[node] for node in sorted(self._row)]
+        self._poses[at, :3, :3] = rows[:, :9].reshape(-1, 3, 3)
+        self._poses[at, :3, 3] = rows[:, 9:]
+
     def _new_solver(self) -> Any:
+        if self._gtsam is None:
+            return None
         parameters = self._gtsam.ISAM2Params()
         parameters.setRelinearizeThreshold(RELINEARISE)
         parameters.relinearizeSkip = 1
         return self._gtsam.ISAM2(parameters)
 
     def _update(self, factors: Iterable[Any], nodes: Iterable[int]) -> None:
+        if self._solver is None:
+            return
         graph = self._gtsam.NonlinearFactorGraph()
         for factor in factors:
             graph.add(factor)
-        self._solver.update(graph, self._values({node: self.poses[node] for node in nodes}))
+        self._solver.update(graph, self._values(nodes))
 
-    def _values(self, poses: dict[int, Array]) -> Any:
+    def _values(self, nodes: Iterable[int]) -> Any:
         values = self._gtsam.Values()
-        for node, T in poses.items():
-            values.insert(node, self._gtsam.Pose3(T))
+        for node in nodes:
+            values.insert(node, self._gtsam.Pose3(self.pose(node)))
         return values
-
-    def _read(self, values: Any) -> None:
-        rows = self._gtsam.utilities.extractPose3(values)    # by keys, row-major R and t
-        for node, row in zip(sorted(self.poses), rows, strict=True):
-            self.poses[node] = se3.compose(row[:9].reshape(3, 3), row[9:])
 
     def _prior(self, node: int) -> Any:
         return self._gtsam.PriorFactorPose3(
-            node, self._gtsam.Pose3(self.poses[node]),
+            node, self._gtsam.Pose3(self.pose(node)),
             self._gtsam.noiseModel.Isotropic.Sigma(6, ORIGIN_SIGMA))
 
     def _factor(self, edge: Edge) -> Any:
