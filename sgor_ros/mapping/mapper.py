@@ -164,6 +164,8 @@ class Mapper:
 
     def _offer(self, loops: list[Edge]) -> list[Edge]:
         """Return the loops that are believed now, closed in the graph."""
+        if self.graph.missing:
+            return []
         closed = [edge for loop in loops
                   for edge in self.consistency.offer(loop, self.mapper_config)]
         if closed:

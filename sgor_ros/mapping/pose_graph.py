@@ -18,15 +18,17 @@ Array = NDArray[np.float64]
 
 ORIGIN_SIGMA = 1e-4
 """Metres and radians: the first node of a part stays where it is put."""
-RELINEARISE = 0.01
-"""Metres and radians: nodes that have moved by more are linearised again."""
+RELINEARISE = (0.02, 5.0)
+"""Radians and metres: nodes that have turned or moved by more are linearised again. Edges are
+straight in the positions, so that these hardly matter."""
 INLIER_PROBABILITY = 0.997
 """Share of right loops that GNC is to keep."""
 AT_THE_BOUND = 0.25
 """Weight that Geman and McClure's loss leaves an edge whose error is at the bound of inliers."""
 INSTALL = "pip install 'sgor_ros[mapping]'"
-ROUNDS = 3
-"""Updates after a loop; the estimate has settled then."""
+ROUNDS = 10
+"""Updates after a loop at most: it ends when no node has to be linearised again."""
+SYMBOL = 'x'
 
 
 class PoseGraph:
@@ -53,7 +55,9 @@ class PoseGraph:
             self._gtsam = library()
         except ImportError as error:
             self.missing = f'loops are not closed: GTSAM is not installed ({error}); {INSTALL}'
-        self._solver = self._new_solver()
+        self._solver: Any = None
+        self._new: list[int] = []    # nodes that the solver has not got yet, with their edges
+        self._new_edges: list[Edge] = []
 
     def __len__(self) -> int:
         return len(self._row)
@@ -88,24 +92,22 @@ class PoseGraph:
     def add_origin(self, node: int, T_map_sensor: Array) -> None:
         """Begin a part of its own with a node at a pose."""
         self._append(node, T_map_sensor, len(self._row))
-        self._update([self._prior(node)] if self._gtsam else [], [node])
 
     def add_node(self, edge: Edge) -> None:
         """Add the source of an edge, whose target is there already."""
         self.edges.append(edge)
+        self._new_edges.append(edge)
         self._append(edge.source, self.pose(edge.target) @ edge.T_target_source,
                      self.part(edge.target))
-        self._update([self._factor(edge)] if self._gtsam else [], [edge.source])
 
     def close(self, loops: Sequence[Edge]) -> None:
         """Add edges between nodes that are there, and optimise. They may join parts."""
         joined = [self._join(loop) for loop in loops]    # all of them, whatever the first says
         self.edges += loops
+        self._new_edges += loops
         if any(joined):    # nodes were moved, which iSAM2 cannot take in
-            self._begin_anew()
-        else:
-            self._update([self._factor(loop) for loop in loops], [])
-        self._settle()
+            self._solver = None
+        self._optimise()
 
     def without_outliers(self, loops: Sequence[Edge]) -> list[Edge]:
         """Return those of some loops that hold together, by graduated non-convexity (GNC).
@@ -136,8 +138,8 @@ class PoseGraph:
         self.edges = [edge for edge in self.edges if edge.kind is Kind.ODOMETRY]
         self._poses = self._by_odometry()
         self.edges += loops
-        self._begin_anew()
-        self._settle()
+        self._solver = None
+        self._optimise()
 
     def chi_squared(self) -> tuple[float, int]:
         """Return the sum of squared errors in standard deviations, and the degrees of freedom."""
@@ -149,6 +151,7 @@ class PoseGraph:
 
     def _append(self, node: int, T_map_sensor: Array, part: int) -> None:
         row = self._row[node] = len(self._row)
+        self._new.append(node)
         self._parent.append(part)
         if row == len(self._poses):
             grown = np.empty((max(64, 2 * row), 4, 4))
@@ -183,54 +186,58 @@ class PoseGraph:
                                                  @ edge.T_target_source)
         return poses
 
-    def _begin_anew(self) -> None:
-        """Build the solver again from all edges and the poses as they are."""
-        self._solver = self._new_solver()
-        self._update([*(self._prior(node) for node in self._origins()),
-                      *(self._factor(edge) for edge in self.edges)], self.nodes)
-
-    def _settle(self) -> None:
+    def _optimise(self) -> None:
+        """Give the solver what is new, and take the poses from it."""
+        if self._solver is None:
+            self._solver = self._new_solver()
+            self._new, self._new_edges = self.nodes, self.edges
+        graph = self._gtsam.NonlinearFactorGraph()
+        for node in self._new:
+            if self._parent[self._row[node]] == self._row[node]:
+                graph.add(self._prior(node))
+        for edge in self._new_edges:
+            graph.add(self._factor(edge))
+        done = self._solver.update(graph, self._values(self._new))
+        self._new, self._new_edges = [], []
         for _ in range(ROUNDS - 1):
-            self._solver.update()
-        values = self._solver.calculateBestEstimate()
+            if not done.getVariablesRelinearized():
+                break
+            done = self._solver.update()
         # sorted by node: R row by row, then t
-        rows = self._gtsam.utilities.extractPose3(values)
+        rows = self._gtsam.utilities.extractPose3(self._solver.calculateEstimate())
         at = [self._row[node] for node in sorted(self._row)]
         self._poses[at, :3, :3] = rows[:, :9].reshape(-1, 3, 3)
         self._poses[at, :3, 3] = rows[:, 9:]
 
     def _new_solver(self) -> Any:
-        if self._gtsam is None:
-            return None
+        turned, moved = RELINEARISE
+        thresholds = self._gtsam.ISAM2ThresholdMap()
+        thresholds.insert((SYMBOL, np.array([turned] * 3 + [moved] * 3)))
         parameters = self._gtsam.ISAM2Params()
-        parameters.setRelinearizeThreshold(RELINEARISE)
+        parameters.setRelinearizeThreshold(thresholds)
         parameters.relinearizeSkip = 1
         return self._gtsam.ISAM2(parameters)
 
-    def _update(self, factors: Iterable[Any], nodes: Iterable[int]) -> None:
-        if self._solver is None:
-            return
-        graph = self._gtsam.NonlinearFactorGraph()
-        for factor in factors:
-            graph.add(factor)
-        self._solver.update(graph, self._values(nodes))
+    def _key(self, node: int) -> int:
+        return int(self._gtsam.symbol(SYMBOL, node))
 
     def _values(self, nodes: Iterable[int]) -> Any:
         values = self._gtsam.Values()
         for node in nodes:
-            values.insert(node, self._gtsam.Pose3(self.pose(node)))
+            values.insert(self._key(node), self._gtsam.Pose3(self.pose(node)))
         return values
 
     def _prior(self, node: int) -> Any:
         return self._gtsam.PriorFactorPose3(
-            node, self._gtsam.Pose3(self.pose(node)),
+            self._key(node), self._gtsam.Pose3(self.pose(node)),
             self._gtsam.noiseModel.Isotropic.Sigma(6, ORIGIN_SIGMA))
 
     def _factor(self, edge: Edge) -> Any:
         turn = np.kron([[0, 1], [1, 0]], edge.T_target_source[:3, :3].T)
         noise = self._gtsam.noiseModel.Gaussian.Covariance(turn @ edge.covariance @ turn.T)
         return self._gtsam.BetweenFactorPose3(
-            edge.target, edge.source, self._gtsam.Pose3(edge.T_target_source), noise)
+            self._key(edge.target), self._key(edge.source),
+            self._gtsam.Pose3(edge.T_target_source), noise)
 
 
 def library() -> Any:
