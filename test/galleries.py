@@ -5,6 +5,7 @@ from scipy.spatial.transform import Rotation
 from sgor_ros.core.features.features import Features
 from sgor_ros.core.index.range_image import range_image
 from sgor_ros.core.index.scan_index import scan_index
+from sgor_ros.core.scan.directions import by_direction
 
 MAX_DISTANCE = 0.6
 UP = np.array([0.0, 0.0, 1.0])
@@ -39,6 +40,11 @@ def gallery(pitch=8.0, offset=0.0, ends=(-40.0, 40.0)):
     return np.concatenate(points), np.concatenate(normals)
 
 
+def seen(points):
+    """Return the range image of all (N, 3) float32 points."""
+    return range_image(by_direction(points), np.ones(len(points), np.bool_))
+
+
 def dense(points, normals):
     """Return what a sensor sees of surfaces of which there is a point every half metre."""
     steps = np.arange(-0.25, 0.3, 0.1)
@@ -50,5 +56,5 @@ def index_of(points, normals, up=UP, max_distance=MAX_DISTANCE, label=0):
     """Return the index of a scan that saw surfaces; all of them with one regional label."""
     labels = np.full(len(points), label, np.uint8)
     features = Features(points, labels, labels, np.zeros((len(points), 3), np.float32))
-    return scan_index(range_image(dense(points, normals).astype(np.float32)), features, normals,
+    return scan_index(seen(dense(points, normals).astype(np.float32)), features, normals,
                       up, max_distance)

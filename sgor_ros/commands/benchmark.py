@@ -12,6 +12,7 @@ from ..core.warmup import warm_up
 from ..io.writing import free_folder
 from ..io.writing import new_folder
 from .benchmarks import ablation
+from .benchmarks import calibrate
 from .benchmarks import pairs
 from .benchmarks import sequence
 from .benchmarks import solver
@@ -38,7 +39,8 @@ class Benchmark(Protocol):
 
 # a new one: a module in benchmarks/, and a line here
 COMMANDS: dict[str, Benchmark] = {
-    'pairs': pairs, 'wrong': wrong, 'ablation': ablation, 'sequence': sequence, 'solver': solver}
+    'pairs': pairs, 'wrong': wrong, 'calibrate': calibrate, 'ablation': ablation,
+    'sequence': sequence, 'solver': solver}
 
 
 def main(argv: list[str] | None = None) -> int:

@@ -1,5 +1,8 @@
 """Pairs and drives in the places of the built-in world, most of which repeat themselves."""
+from __future__ import annotations
+
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +14,9 @@ from ..evaluation.protocols.pairs import frame_in_memory
 from ..evaluation.protocols.pairs import Pair
 from ..io.datasets import Drive
 from ..io.datasets import DriveScan
+
+if TYPE_CHECKING:
+    from ..world import Lidar
 
 
 def scene_kinds(names: Sequence[str]) -> dict[str, bool]:
@@ -32,7 +38,7 @@ def scene_kinds(names: Sequence[str]) -> dict[str, bool]:
     return {name: not KINDS[name].unique for name in names or KINDS}
 
 
-def scene_pairs(kind: str, count: int, seed: int) -> list[Pair]:
+def scene_pairs(kind: str, count: int, seed: int, lidar: Lidar | None = None) -> list[Pair]:
     """Scan places of a kind.
 
     Parameters
@@ -43,16 +49,18 @@ def scene_pairs(kind: str, count: int, seed: int) -> list[Pair]:
         Places; each gives a pair of its own and a pair with the next one.
     seed : int
         Chooses places, poses and noise.
+    lidar : Lidar, optional
+        Default: that of a car.
 
     Returns
     -------
     list of Pair
         First `count` pairs of the same place, then `count` of different places.
     """
-    from ..world import Lidar
+    from .. import world
     from ..world import scenes
     rng = np.random.default_rng([seed, list(scenes.KINDS).index(kind)])
-    lidar = Lidar()
+    lidar = lidar or world.Lidar()
     same: list[Pair] = []
     targets: list[DriveScan] = []
     for index in range(count + 1):

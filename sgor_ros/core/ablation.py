@@ -20,6 +20,10 @@ class Ablation(Settings):
 
     FOR_STUDIES: ClassVar[bool] = True
 
+    drop_isolated: bool = setting(
+        True, 'Leave out returns without others around them at the same range, rain, dust and '
+        'ghosts (beyond the paper)')
+
     # secondary ground segmentation (Sec. III-B, Eq. 2-3)
     secondary_ground: bool = setting(
         True, 'Segment the ground a second time by distance; false: by labels only (ablation 3)')
@@ -97,7 +101,7 @@ class Ablation(Settings):
     refinement_rounds: int = setting(
         3, 'Times that the refinement fits; the paper: once', minimum=1, maximum=100)
     min_inliers: int = setting(
-        10, 'Fewer inliers, or inliers on a line, are a failure; 0: neither is asked (beyond the '
+        5, 'Fewer inliers, or inliers on a line, are a failure; 0: neither is asked (beyond the '
         'paper)', minimum=0, maximum=10000)
 
     # on the clouds (beyond the paper)

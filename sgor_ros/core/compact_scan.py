@@ -22,12 +22,12 @@ from .features.features import Features
 from .features.semantic_context import context_classes
 from .features.semantic_context import semantic_context
 from .index.columns import in_columns
-from .index.range_image import AZIMUTHS
-from .index.range_image import ELEVATIONS
 from .index.scan_index import scan_index
 from .index.surface import Surface
 from .prepared_scan import PreparedScan
 from .preprocessing import fpfh_descriptors
+from .scan.directions import AZIMUTHS
+from .scan.directions import ELEVATIONS
 from .scan.ground import Ground
 from .scan.labels import label_convention
 
@@ -39,7 +39,7 @@ ARRAYS: dict[str, tuple[type, tuple[int | str, ...]]] = {
     'points': (np.float64, ('V', 3)), 'normals': (np.float64, ('V', 3)),
     'labels': (np.uint8, ('V',)), 'regional': (np.uint8, ('V',)),
     'descriptors': (np.float32, ('V', 'D')), 'context_classes': (np.uint8, ('C',)),
-    'plane': (np.float64, ('G',)), 'seen': (np.uint8, (CELLS // 8,)),
+    'plane': (np.float64, ('G',)), 'origin': (np.float64, (3,)), 'seen': (np.uint8, (CELLS // 8,)),
     'ranges': (np.float32, ('R',)), 'surface_points': (np.float32, ('S', 3)),
     'surface_normals': (np.float32, ('S', 3)), 'surface_sizes': (np.float64, (2,))}
 
@@ -58,12 +58,15 @@ class CompactScan:
         What the lengths of the configuration were multiplied by.
     ground_source : str
         Where the first guess of the ground came from, as in `Ground`; empty without ground.
+    ground_certain : bool
+        As in `Ground`.
     arrays : dict of str to array
         ``points``, ``normals`` : (V, 3) float64, keypoints, metres, and their unit normals;
         ``labels``, ``regional`` : (V,) uint8, classes inside of keypoints and neighbourhoods;
         ``descriptors`` : (V, D) float32 of the caller, D is 0 where they follow from the rest;
         ``context_classes`` : (C,) uint8, classes that the semantic context tells apart;
         ``plane`` : (4,) float64, normal and offset of the ground, metres; (0,) without;
+        ``origin`` : (3,) float64, place of the sensor, metres;
         ``seen`` : (8100,) uint8, cells of the range image that have a range, as bits;
         ``ranges`` : (R,) float32, those ranges, metres;
         ``surface_points``, ``surface_normals`` : (S, 3) float32, cloud of the local refinement;
@@ -73,6 +76,7 @@ class CompactScan:
     config: SgorConfig
     scale: float
     ground_source: str
+    ground_certain: bool
     arrays: dict[str, NDArray[Any]]
 
     @property
@@ -87,7 +91,7 @@ class CompactScan:
     def as_arrays(self) -> dict[str, NDArray[Any]]:
         """Return all of it as arrays without objects, for `numpy.savez` and the like."""
         about = {'version': VERSION, 'config': asdict(self.config), 'scale': self.scale,
-                 'ground_source': self.ground_source}
+                 'ground_source': self.ground_source, 'ground_certain': self.ground_certain}
         return {'about': np.frombuffer(json.dumps(about).encode(), np.uint8), **self.arrays}
 
     @classmethod
@@ -111,7 +115,7 @@ class CompactScan:
         found = {name: _checked(arrays, name, lengths) for name in ARRAYS}
         try:
             made = cls(SgorConfig.from_values(about['config']), float(about['scale']),
-                       str(about['ground_source']), found)
+                       str(about['ground_source']), bool(about['ground_certain']), found)
         except (LookupError, TypeError, ValueError) as error:
             raise InputError(f'about: not of a compact scan ({error})') from error
         made._check(lengths)
@@ -146,7 +150,8 @@ class CompactScan:
         ground = heights = context = None
         if self.ground_source:
             ground = Ground(have['plane'][:3], float(have['plane'][3]), np.zeros(0, np.bool_),
-                            'labels' if self.ground_source == 'labels' else 'geometry')
+                            'labels' if self.ground_source == 'labels' else 'geometry',
+                            self.ground_certain)
             heights = ground.heights(points)
             if config.context_weight > 0:
                 context = partial(semantic_context, points, regional, ground,
@@ -158,7 +163,7 @@ class CompactScan:
         ranges[np.unpackbits(have['seen']).astype(np.bool_)] = have['ranges']
         index = scan_index(ranges.reshape(AZIMUTHS, ELEVATIONS), features, normals,
                            None if ground is None else ground.normal,
-                           config.max_correspondence_distance)
+                           config.max_correspondence_distance, have['origin'])
         return PreparedScan(None, self.config, self.scale, features, ground, index,
                             Lazy(partial(_surface, have)), (), {})
 
@@ -176,12 +181,13 @@ def compact(prepared: PreparedScan) -> CompactScan:
         'descriptors': features.descriptors if given else np.zeros((len(features.points), 0)),
         'context_classes': classes,
         'plane': () if ground is None else (*ground.normal, ground.offset),
-        'seen': np.packbits(seen), 'ranges': index.ranges.ravel()[seen],
+        'origin': index.origin, 'seen': np.packbits(seen), 'ranges': index.ranges.ravel()[seen],
         'surface_points': none if surface is None else surface.columns.points,
         'surface_normals': none if surface is None else surface.normals,
         'surface_sizes': (0.0, 0.0) if surface is None else (surface.columns.edge,
                                                             surface.middle_range)}
     return CompactScan(prepared.config, prepared.scale, '' if ground is None else ground.source,
+                       ground is None or ground.certain,
                        {name: np.array(arrays[name], kind) for name, (kind, _) in ARRAYS.items()})
 
 

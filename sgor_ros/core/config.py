@@ -11,7 +11,8 @@ from .common.settings import setting
 from .common.settings import Value
 
 PAPER_STEPS: dict[str, Value] = {
-    'labelled_ground': True, 'robust_ground': False, 'drop_ground_labels': 'point',
+    'drop_isolated': False, 'labelled_ground': True, 'robust_ground': False,
+    'drop_ground_labels': 'point',
     'sampled_keypoints': True, 'quick_keypoints': 0, 'match_within_labels': False,
     'unlabelled_attempt': False, 'height_gate': 0.0, 'context_weight': 0.0, 'moving_vote': True,
     'weight_cutoff': 6.0, 'cloud_check': False, 'refinement_rounds': 1,
@@ -61,7 +62,8 @@ class SgorConfig(Ablation):
         0.6, 'Correspondences nearer than this under the best hypothesis refine it', 'm',
         minimum=0.005, maximum=5.0, group='thresholds')
     min_confidence: float = setting(
-        0.85, 'Results below this confidence are failures; 0: accept all',
+        0.8, 'Results that are right with less probability are failures: at 0.8 a wrong one costs '
+        'what four right ones are worth; 0: accept all',
         minimum=0.0, maximum=1.0, group='trust')
     hypothesis_radius: float = setting(
         30.0, 'Other placements that explain the scans are looked for so far from the answer; 0: '
@@ -128,8 +130,9 @@ class SgorConfig(Ablation):
 
 
 PREPARATION = (
-    'label_convention', 'min_range', 'max_range', 'voxel_size', 'max_voxels', 'sigma_g',
-    'secondary_ground', 'labelled_ground', 'robust_ground', 'ground_radius', 'min_ground_points',
+    'label_convention', 'min_range', 'max_range', 'drop_isolated', 'voxel_size', 'max_voxels',
+    'sigma_g', 'secondary_ground', 'labelled_ground', 'robust_ground', 'ground_radius',
+    'min_ground_points',
     'correspondence_preprocessing', 'drop_ground_labels', 'normal_radius', 'descriptor_radius',
     'vote_radius', 'context_weight', 'context_scale', 'moving_vote',
     'max_correspondence_distance')

@@ -11,6 +11,7 @@ from .features.features import Features
 from .index.scan_index import ScanIndex
 from .index.surface import Surface
 from .scan.ground import Ground
+from .scan.ground import Up
 from .scan.scan import SemanticScan
 
 Given = tuple[ArrayLike | None, ArrayLike | None]
@@ -43,6 +44,8 @@ class PreparedScan:
         Stage to seconds.
     given : pair of arrays or None
         Keypoints and descriptors of the caller.
+    up : Up or None
+        What was known of the direction up.
     """
 
     scan: SemanticScan | None
@@ -55,6 +58,7 @@ class PreparedScan:
     warnings: tuple[str, ...]
     timings: dict[str, float]
     given: Given | None = None
+    up: Up | None = None
 
     def check(self, config: SgorConfig, name: str) -> None:
         """Refuse a configuration that this scan was not prepared with.

@@ -30,9 +30,12 @@ from .index.surface import surface
 from .prepared_scan import as_scan
 from .prepared_scan import Given
 from .prepared_scan import PreparedScan
+from .scan.directions import by_direction
 from .scan.ground import Ground
 from .scan.ground import printed_ground
 from .scan.ground import segment_ground
+from .scan.ground import Up
+from .scan.isolated_returns import not_isolated
 from .scan.labels import label_convention
 from .scan.labels import LabelConvention
 from .scan.point_filter import usable_points
@@ -48,7 +51,8 @@ from .scan.voxels import VoxelCloud
 
 def preprocess(scan: SemanticScan | ArrayLike, config: SgorConfig | None = None, *,
                keypoints: ArrayLike | None = None, descriptors: ArrayLike | None = None,
-               scale_before: float | None = None) -> PreparedScan:
+               scale_before: float | None = None, up_before: ArrayLike | None = None
+               ) -> PreparedScan:
     """Segment the ground and describe the rest of one scan, once for all its registrations.
 
     Parameters
@@ -63,6 +67,8 @@ def preprocess(scan: SemanticScan | ArrayLike, config: SgorConfig | None = None,
         Their learned features, such as FCGF; both scans need the same D.
     scale_before : float, optional
         The scale of the scan before, to keep where it fits nearly as well.
+    up_before : (3,) array, optional
+        Which way was up for the scan before, to keep where a plane agrees with it.
 
     Returns
     -------
@@ -80,7 +86,8 @@ def preprocess(scan: SemanticScan | ArrayLike, config: SgorConfig | None = None,
         raise InputError('scan: it has been preprocessed already')
     with cores(config.threads):
         given = None if keypoints is None and descriptors is None else (keypoints, descriptors)
-        return _prepare(semantic, config, given, scale_before)
+        up = _up(semantic, up_before)
+        return _prepare(semantic, config, given, scale_before, up)
 
 
 def at_scale(prepared: PreparedScan, scale: float) -> PreparedScan:
@@ -94,12 +101,19 @@ def at_scale(prepared: PreparedScan, scale: float) -> PreparedScan:
     if prepared.scale == scale:
         return prepared
     again = _prepare(prepared.raw('its scale is another'), prepared.config.replace(scale=scale),
-                     prepared.given, None)
+                     prepared.given, None, prepared.up)
     return replace(again, config=prepared.config)
 
 
+def _up(scan: SemanticScan, before: ArrayLike | None) -> Up | None:
+    """Return what is known of the direction up: from the mount, or from the scan before."""
+    if scan.up is not None:
+        return Up(scan.up, told=True)
+    return None if before is None else Up(np.asarray(before, np.float64), told=False)
+
+
 def _prepare(scan: SemanticScan, asked: SgorConfig, given: Given | None,
-             scale_before: float | None) -> PreparedScan:
+             scale_before: float | None, up: Up | None) -> PreparedScan:
     convention = label_convention(asked.label_convention)
     clock = Stopwatch()
     scale = asked.scale or 1.0
@@ -118,14 +132,14 @@ def _prepare(scan: SemanticScan, asked: SgorConfig, given: Given | None,
     if len(cloud.points) > config.max_voxels:
         warnings.append(f'{len(cloud.points)} voxels thinned to {config.max_voxels}')
         cloud = cloud[thin(len(cloud.points), config.max_voxels)]
-    cloud, regional, directions, ground = _segmented(cloud, points, labels, convention, config,
-                                                        clock)
+    cloud, regional, directions, ground = _segmented(scan, cloud, points, labels, convention,
+                                                        up, config, clock)
     if given is None:
         features = Features(cloud.points, cloud.labels, regional, partial(
             fpfh_descriptors, cloud.points, directions, config.descriptor_radius))
     else:
         features = _given(*given, cloud, regional, config)
-        directions = normals(features.points, radius_neighbours(
+        directions = normals(scan.seen_from_sensor(features.points), radius_neighbours(
             features.points, config.normal_radius), config.normal_radius)
     if ground is None:
         warnings.append('no ground plane found: no ground check')
@@ -136,11 +150,11 @@ def _prepare(scan: SemanticScan, asked: SgorConfig, given: Given | None,
     with clock('index'):
         index = scan_index(ranges, features, directions,
                            None if ground is None else ground.normal,
-                           config.max_correspondence_distance)
+                           config.max_correspondence_distance, scan.origin)
     return PreparedScan(
         scan, asked, scale, features, ground, index,
-        Lazy(partial(_fixed_surface, points, labels, convention, config)), tuple(warnings),
-        clock.seconds, given)
+        Lazy(partial(_fixed_surface, scan, points, labels, convention, config)), tuple(warnings),
+        clock.seconds, given, up)
 
 
 def _gridded(scan: SemanticScan, convention: LabelConvention, asked: SgorConfig, scale: float,
@@ -150,18 +164,25 @@ def _gridded(scan: SemanticScan, convention: LabelConvention, asked: SgorConfig,
     config = asked.scaled(scale)
     with clock('voxel grid'):
         points, labels, warnings = usable_points(scan, convention, config)
+        rays = by_direction(scan.seen_from_sensor(points))
+        kept = np.ones(len(points), np.bool_)
+        if config.drop_isolated:
+            kept = not_isolated(rays, config.voxel_size)
+            points, labels = np.compress(kept, points, axis=0), labels[kept]
         cloud, ranges = run_both(
             config.threads, partial(voxel_grid, points, labels, config.voxel_size),
-            partial(range_image, points))
+            partial(range_image, rays, kept))
     return config, points, labels, warnings, cloud, ranges
 
 
-def _segmented(cloud: VoxelCloud, points: NDArray[np.float32], labels: NDArray[np.uint8],
-               convention: LabelConvention, config: SgorConfig, clock: Stopwatch
+def _segmented(scan: SemanticScan, cloud: VoxelCloud, points: NDArray[np.float32],
+               labels: NDArray[np.uint8], convention: LabelConvention, up: Up | None,
+               config: SgorConfig, clock: Stopwatch
                ) -> tuple[VoxelCloud, NDArray[np.uint8], NDArray[np.float64], Ground | None]:
     """Return the voxels that may be matched, their regional labels and normals; the ground."""
     with clock('ground'):
-        ground = (segment_ground(cloud, convention.ground, config) if config.robust_ground else
+        ground = (segment_ground(cloud, convention.ground, config, up, scan.origin)
+                  if config.robust_ground else
                   printed_ground(cloud, points, labels, convention.ground, config))
         if ground is not None and config.correspondence_preprocessing:
             cloud = cloud[~ground.mask]
@@ -174,18 +195,19 @@ def _segmented(cloud: VoxelCloud, points: NDArray[np.float32], labels: NDArray[n
         if config.correspondence_preprocessing and config.drop_ground_labels == 'point':
             keep &= ~np.isin(cloud.labels, list(convention.ground))    # S_n of Eq. 4
     with clock('normals'):
-        directions = normals(cloud.points, neighbours, config.normal_radius, keep)
+        directions = normals(scan.seen_from_sensor(cloud.points), neighbours,
+                             config.normal_radius, keep)
     return cloud[keep], regional[keep], directions[keep], ground
 
 
-def _fixed_surface(points: NDArray[np.float32], labels: NDArray[np.uint8],
+def _fixed_surface(scan: SemanticScan, points: NDArray[np.float32], labels: NDArray[np.uint8],
                    convention: LabelConvention, config: SgorConfig) -> Surface | None:
     """Return the surface of all that stands still, on a grid that no other scan has."""
     cloud = voxel_grid(points, labels, config.voxel_size, shift_of(points))
     if len(cloud.points) > config.max_voxels:
         cloud = cloud[thin(len(cloud.points), config.max_voxels)]
     fixed = config.moving_vote | ~np.isin(cloud.labels, list(convention.movable))
-    return surface(cloud.points[fixed], config.voxel_size)
+    return surface(cloud.points[fixed], config.voxel_size, scan.origin)
 
 
 def _unmatched_classes(convention: LabelConvention, config: SgorConfig) -> list[int]:

@@ -133,8 +133,8 @@ def _best_attempt(source: PreparedScan, target: PreparedScan, config: SgorConfig
                   clock: Stopwatch) -> Attempt:
     """Return the first attempt above min_confidence; where there is none, the best."""
     labelled = all(scan.features.labelled_share > 0 for scan in (source, target))
-    doubtful = source.scale < 1 and any(
-        scan.ground is None or scan.ground.source == 'geometry' for scan in (source, target))
+    doubtful = any(not scan.ground.certain if scan.ground else scan.scale < 1
+                   for scan in (source, target))
     best: Attempt | None = None
     for way in _attempts(config, labelled=labelled, level=not doubtful):
         found = _attempt(source, target, way, clock)
@@ -215,7 +215,8 @@ def _hints(result: Registration, source: PreparedScan, target: PreparedScan,
     hints = [scale_hint(result, config)]
     if not result.success:
         hints += [f'{side}: {hint}' for side, scan in (('source', source), ('target', target))
-                  if scan.scan and (hint := frame_hint(scan.scan.points, config))]
+                  if scan.scan and (hint := frame_hint(
+                      scan.scan.seen_from_sensor(scan.scan.points), config))]
     return tuple(filter(None, hints))
 
 

@@ -57,6 +57,7 @@ class Tracker:
         self._late = 0
         self._tracks = 0
         self._ids = 0
+        self._up: Array | None = None    # for the last scan, in its sensor's frame
         self.reset()
 
     def reset(self) -> None:
@@ -110,7 +111,9 @@ class Tracker:
         """Find the pose of a scan that is on time."""
         prepared = preprocess(
             scan, self.config,
-            scale_before=self._reference.prepared.scale if self._reference else None)
+            scale_before=self._reference.prepared.scale if self._reference else None,
+            up_before=self._up)
+        self._up = prepared.ground.normal if prepared.ground else None
         new = ScanAtWork(prepared, stamp_ns, [*warnings, *prepared.warnings],
                          dict(prepared.timings))
         if self._reference is None:
@@ -128,6 +131,7 @@ class Tracker:
     def _forget(self) -> None:
         self._keyframes = Keyframes()
         self._reference = None
+        self._up = None
         self._motion = Motion.unknown(0, np.eye(4), np.zeros((6, 6)), self.tracker_config)
         self._track_id = self._tracks
         self._failures = 0

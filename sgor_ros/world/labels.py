@@ -1,6 +1,8 @@
 """Raw SemanticKITTI label ids of the classes in the world."""
 
+UNLABELLED = 0
 CAR = 10
+TRUCK = 18
 ROAD = 40
 PARKING = 44
 SIDEWALK = 48

@@ -13,8 +13,9 @@ from ..scan.voxels import thin
 
 TURNS = 4
 """Quarter turns: what people build repeats itself under these."""
-KEYPOINTS, PEAKS = 200, 4
-"""Keypoints that are swept over the map, and poses that come of each turn."""
+KEYPOINTS, PEAKS = 200, (12, 6, 6, 6)
+"""Keypoints that are swept over the map, and poses that come of each turn: along a facade the
+next window is a peak, but it is the bays that repeat."""
 
 
 def correlate_maps(source: ScanIndex, target: ScanIndex, T_target_source: NDArray[np.float64],
@@ -26,10 +27,11 @@ def correlate_maps(source: ScanIndex, target: ScanIndex, T_target_source: NDArra
     radius : float
         Farthest shift of the source's sensor along either axis of the ground plane, metres.
     """
-    rows = thin(len(source.points), KEYPOINTS)
+    facing = source.normals @ (target.axes @ T_target_source[:3, :3]).T
+    rows = _normal_space_sample(sectors_of(facing), KEYPOINTS)
     placed = se3.transform(T_target_source, source.points[rows]) @ target.axes.T
     sensor = target.axes @ T_target_source[:3, 3]
-    facing = source.normals[rows] @ (target.axes @ T_target_source[:3, :3]).T
+    facing = facing[rows]
     bev = target.birds_eye_view
     kinds = kinds_of(source.labels[rows], placed[:, 2], bev.edge)
     turned, bits = np.empty((TURNS, len(rows), 2)), np.empty((TURNS, len(rows)), np.uint64)
@@ -55,6 +57,22 @@ def correlate_maps(source: ScanIndex, target: ScanIndex, T_target_source: NDArra
                            target.axes.T @ (sensor - about @ sensor + shift))
         found[k] = move @ T_target_source
     return found
+
+
+def _normal_space_sample(sectors: NDArray[np.int64], most: int) -> NDArray[np.intp]:
+    """Return rows of at most `most` keypoints, as many of each sector that they face as can be.
+
+    Normal-space sampling (Rusinkiewicz and Levoy 2001): along a wall only the few surfaces that
+    face along it tell one place from the next.
+    """
+    present, counts = np.unique(sectors, return_counts=True)
+    share = np.zeros(len(present), np.int64)
+    for at in np.argsort(counts):    # what the small ones leave is for the others
+        open_ = len(present) - int((share > 0).sum())
+        share[at] = min(counts[at], -(-(most - share.sum()) // open_))
+    rows = [np.flatnonzero(sectors == sector)[thin(int(count), int(part))]
+            for sector, count, part in zip(present, counts, share, strict=True) if part]
+    return np.sort(np.concatenate(rows)) if rows else np.zeros(0, np.intp)
 
 
 def _quarter(turn: int) -> NDArray[np.float64]:
@@ -85,11 +103,11 @@ def _sweep(begin, end, columns, bits, cells, half, hits):
                 row[first + j] += np.int32((run[j] & bit) != 0)
 
 
-def _peaks(hits: NDArray[np.int32], most: int) -> list[tuple[int, int, int]]:
+def _peaks(hits: NDArray[np.int32], most: tuple[int, ...]) -> list[tuple[int, int, int]]:
     """Return the `most` highest (turn, i, j) of each turn, none next to a higher; spoils hits."""
     peaks = []
     for turn in range(len(hits)):
-        for _ in range(most):
+        for _ in range(most[turn]):
             i, j = divmod(int(hits[turn].argmax()), hits.shape[2])
             if hits[turn, i, j] == 0:
                 break

@@ -10,20 +10,17 @@ Array = NDArray[np.float64]
 CORRELATED_PAIRS = 8
 """So many pairs of points err as one: the pattern of the beams and the grid leave less to average
 than there are pairs."""
-HELD = 0.01
-"""Directions in which the noise stays below this, in edges of the grid, are held by surfaces."""
-SCATTERED = 40
-"""Beyond it only scattered things hold a direction, trunks or posts, whose many points err as one:
-the variance grows by up to so many times."""
-SCATTERED_REPEATS = 0.25
-"""This share of what the variance grows by errs alike in step after step: the same trunks are seen
-from nearly the same side."""
+CORRELATED_PARTS = 2.0
+"""So many parts of the scan err as one: a surface may reach through several."""
+PARTS_REPEAT = 0.25
+"""This share of what the parts tell errs alike in step after step: the same trunks are seen from
+nearly the same side."""
 ALONG = 0.02
 """The grid and the rings of the beams move with the sensor and pull a motion towards what they
 repeat at. Standard deviation along the motion, in edges of the grid."""
 ACROSS = 0.002
 """The same across the motion."""
-TURN = 0.024
+TURN = 0.018
 """The same of a point at the middle range when the scan is tilted or turned."""
 LEAST_MEAN_SQUARE = 0.01
 """Of the Mahalanobis distances: a scan that is sent twice fits without noise, which says nothing
@@ -54,36 +51,35 @@ def noise(information: Array, error: float, pairs: int) -> Array | None:
     return (covariance + covariance.T) / 2
 
 
-def scattered(covariance: Array, middle_range: float, edge: float) -> Array:
-    """Widen a (6, 6) covariance of noise in the directions that no surfaces hold.
+def between_parts(information: Array, gradients: Array) -> Array:
+    """Return the (6, 6) covariance that the parts of a scan show by not agreeing (sandwich).
+
+    Pairs of one part err alike: they lie on the same trunk, on the same ring of the beams, are of
+    the same car that drives. What each part pulls by, beyond what balances the others, tells how
+    much, whatever the reason is: the cluster-robust estimator of a least squares fit.
 
     Parameters
     ----------
-    covariance : (6, 6) float64
-    middle_range : float
-        Median distance of the points from the sensor, metres: it makes lengths of rotations.
-    edge : float
-        Edge of the voxel grid, metres.
+    information : (6, 6) float64
+    gradients : (B, 6) float64
+        Of the error, a row a part; their sum is about zero.
     """
-    scale = np.array([1.0] * 3 + [middle_range] * 3)
-    values, vectors = np.linalg.eigh(covariance * np.outer(scale, scale))
-    loose = (values / (HELD * edge)**2)**2
-    values = values * (1 + SCATTERED * loose / (1 + loose))
-    widened: Array = (vectors * values) @ vectors.T / np.outer(scale, scale)
-    return (widened + widened.T) / 2
+    inverse = np.linalg.inv(information)
+    spread: Array = inverse @ (gradients.T @ gradients) @ inverse
+    return CORRELATED_PARTS * (spread + spread.T) / 2
 
 
-def correlated_part(root: Array, random: Array, wider: Array) -> Array:
-    """Return the square root of what errs alike where scattered things err alike too.
+def correlated_part(root: Array, parts: Array) -> Array:
+    """Return the square root of all that errs alike in step after step.
 
     Parameters
     ----------
     root : (6, 6) float64
         Of `correlated_error`.
-    random, wider : (6, 6) float64
-        Covariance of noise, before and after `scattered`.
+    parts : (6, 6) float64
+        Covariance `between_parts`.
     """
-    values, vectors = np.linalg.eigh(root @ root.T + SCATTERED_REPEATS * (wider - random))
+    values, vectors = np.linalg.eigh(root @ root.T + PARTS_REPEAT * parts)
     both: Array = (vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T
     return both
 

@@ -10,10 +10,10 @@ from ..config import SgorConfig
 from ..execution.threads import parallel_for
 from ..index.columns import window
 from ..index.surface import Surface
+from .covariance import between_parts
 from .covariance import correlated_error
 from .covariance import correlated_part
 from .covariance import noise
-from .covariance import scattered
 from .normal_equations import add_pair
 from .normal_equations import TERMS
 
@@ -81,9 +81,9 @@ def align(source: Surface, target: Surface, T_target_source: NDArray[np.float64]
     random = noise(information, error, pairs)
     if random is None:
         return Alignment(T, None, repeated, converged, pairs)
-    wider = scattered(random, source.middle_range, config.voxel_size)
-    covariance = wider + repeated @ repeated.T
-    return Alignment(T, covariance, correlated_part(repeated, random, wider), converged, pairs)
+    parts = between_parts(information, sums[:, 21:27])
+    covariance = random + parts + repeated @ repeated.T
+    return Alignment(T, covariance, correlated_part(repeated, parts), converged, pairs)
 
 
 @numba.njit(cache=True, nogil=True)

@@ -1,41 +1,29 @@
 """The range image of one scan: how far it has seen in each direction."""
-import math
-
 import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from ..common.angles import atan2
-
-AZIMUTHS, ELEVATIONS = 360, 180
-"""Cells of the range image: 1 degree, wider than the gaps between beams."""
-
-
-@numba.njit(cache=True, nogil=True, inline='always')
-def direction(x, y, z):
-    """Return the cell of the range image that a point is seen in."""
-    azimuth = int((atan2(y, x) / (2 * math.pi) + 0.5) * AZIMUTHS)
-    elevation = int((atan2(z, math.sqrt(x * x + y * y)) / math.pi + 0.5) * ELEVATIONS)
-    return min(max(azimuth, 0), AZIMUTHS - 1), min(max(elevation, 0), ELEVATIONS - 1)
+from ..scan.directions import AZIMUTHS
+from ..scan.directions import ELEVATIONS
+from ..scan.directions import Rays
 
 
-def range_image(points: NDArray[np.float32]) -> NDArray[np.float32]:
+def range_image(rays: Rays, kept: NDArray[np.bool_]) -> NDArray[np.float32]:
     """Return the shortest range measured in each direction or next to it, metres.
 
-    Of all (N, 3) points of a scan, in the sensor frame: it has looked through all before them.
+    Of the returns of a scan that are kept, (N,) bool: it has looked through all before them.
     """
-    return _shortest_around(_range_image(points))
+    return _shortest_around(_nearest(rays.first, rays.ranges, rays.order, kept).reshape(
+        AZIMUTHS, ELEVATIONS))
 
 
 @numba.njit(cache=True, nogil=True)
-def _range_image(points):
-    nearest = np.full((AZIMUTHS, ELEVATIONS), np.inf, np.float32)
-    for i in range(len(points)):
-        x, y, z = points[i]
-        r = math.sqrt(x * x + y * y + z * z)
-        if r > 0:
-            a, e = direction(x, y, z)
-            nearest[a, e] = min(nearest[a, e], r)
+def _nearest(first, ranges, order, kept):
+    nearest = np.full(len(first) - 1, np.inf, np.float32)
+    for cell in range(len(nearest)):
+        for i in range(first[cell], first[cell + 1]):
+            if kept[order[i]] and 0 < ranges[i] < nearest[cell]:
+                nearest[cell] = ranges[i]
     return nearest
 
 

@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 
 from ..common.products import times_transposed
 from ..features.features import Features
+from ..scan.scan import ORIGIN
 from .birds_eye_view import birds_eye_view
 from .birds_eye_view import BirdsEyeView
 from .columns import Columns
@@ -31,6 +32,8 @@ class ScanIndex:
     ranges : (360, 180) float32
         Shortest range measured in each direction or next to it, metres; infinite where nothing
         was.
+    origin : (3,) float64
+        Place of the sensor, metres.
     axes : (3, 3) float64
         Two axes of the ground plane and the direction up, as rows.
     level : bool
@@ -46,13 +49,15 @@ class ScanIndex:
     column_normals: NDArray[np.float64]
     column_labels: NDArray[np.uint8]
     ranges: NDArray[np.float32]
+    origin: NDArray[np.float64]
     axes: NDArray[np.float64]
     level: bool
     birds_eye_view: BirdsEyeView
 
 
 def scan_index(ranges: NDArray[np.float32], features: Features, normals: NDArray[np.float64],
-               up: NDArray[np.float64] | None, max_distance: float) -> ScanIndex:
+               up: NDArray[np.float64] | None, max_distance: float,
+               origin: NDArray[np.float64] = ORIGIN) -> ScanIndex:
     """Index one scan.
 
     Parameters
@@ -67,11 +72,14 @@ def scan_index(ranges: NDArray[np.float32], features: Features, normals: NDArray
         Unit normal of the ground; None without a ground plane.
     max_distance : float
         Maximum correspondence distance, metres.
+    origin : (3,) float64
+        Place of the sensor, metres.
     """
     columns = in_columns(features.points, max_distance)
     axes = np.eye(3) if up is None else np.vstack((np.linalg.svd(up[None])[2][1:], up))
     return ScanIndex(
         features.points, normals, features.regional, max_distance, columns,
-        normals[columns.order], features.regional[columns.order], ranges, axes, up is not None,
+        normals[columns.order], features.regional[columns.order], ranges, origin, axes,
+        up is not None,
         birds_eye_view(times_transposed(features.points, axes), times_transposed(normals, axes),
                        features.regional, max_distance))

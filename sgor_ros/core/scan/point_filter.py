@@ -14,7 +14,8 @@ UNKNOWN_TOLD = 5
 def usable_points(scan: SemanticScan, convention: LabelConvention, config: SgorConfig
            ) -> tuple[NDArray[np.float32], NDArray[np.uint8], list[str]]:
     """Return points within range, their classes inside, and what was odd."""
-    squared = np.einsum('ij,ij->i', scan.points, scan.points)
+    relative = scan.seen_from_sensor(scan.points)
+    squared = np.einsum('ij,ij->i', relative, relative)
     keep = (squared >= config.min_range**2) & (squared <= config.max_range**2)
     if scan.labels is None:
         points = np.compress(keep, scan.points, axis=0)    # six times as fast as [keep]

@@ -7,10 +7,13 @@ from numpy.typing import ArrayLike
 from numpy.typing import NDArray
 
 from ..common.checks import as_labels
+from ..common.checks import as_numbers
 from ..common.checks import as_points
 from ..common.checks import finite_rows
 from ..common.settings import InputError
 
+ORIGIN = np.zeros(3)
+"""Where the sensor is, as a rule."""
 ROUNDED = 1e-3
 """Metres: what is told of rounding to float32, which begins some 10 km from the origin."""
 
@@ -27,19 +30,29 @@ class SemanticScan:
         Metres, in the sensor frame. Rows that are not finite are dropped, with their labels.
     labels : (N,) array of integers, optional
         Ids of the configured label convention.
+    origin : (3,) array, optional
+        Where the sensor is in the frame of the points, metres: for clouds in the frame of the
+        vehicle, or of a map. Default: at the origin.
+    up : (3,) array, optional
+        Which way is up in that frame, from the mount or gravity, to within 30 degrees. Without
+        it the scan itself has to tell.
 
     Raises
     ------
     InputError
-        Wrong shape or type; labels of another length; no finite point.
+        Wrong shape or type; labels of another length; no finite point; an `up` without length.
     """
 
     points: NDArray[np.float32]
     labels: NDArray[np.int64] | None
+    origin: NDArray[np.float64]
+    up: NDArray[np.float64] | None
+    """Of length one."""
     rounding: float
     """How far off half of the points are at least for being kept as float32, metres; 0: little."""
 
-    def __init__(self, points: ArrayLike, labels: ArrayLike | None = None) -> None:
+    def __init__(self, points: ArrayLike, labels: ArrayLike | None = None, *,
+                 origin: ArrayLike | None = None, up: ArrayLike | None = None) -> None:
         exact = as_points(points, 'points', None)
         with np.errstate(over='ignore'):
             clean = exact.astype(np.float32, order='C')
@@ -53,7 +66,17 @@ class SemanticScan:
             ids = None if ids is None else ids[finite]
         object.__setattr__(self, 'points', clean)
         object.__setattr__(self, 'labels', ids)
+        object.__setattr__(self, 'origin',
+                           ORIGIN if origin is None else _vector(origin, 'origin'))
+        object.__setattr__(self, 'up', None if up is None else _unit(_vector(up, 'up'), 'up'))
         object.__setattr__(self, 'rounding', _rounding(exact, clean))
+
+    def seen_from_sensor(self, points: NDArray[Any]) -> NDArray[Any]:
+        """Return (N, 3) points of its frame relative to the sensor, metres."""
+        if not self.origin.any():
+            return points
+        moved: NDArray[Any] = points - self.origin.astype(points.dtype)
+        return moved
 
     def __len__(self) -> int:
         return len(self.points)
@@ -61,6 +84,27 @@ class SemanticScan:
     def __repr__(self) -> str:
         labels = '' if self.labels is None else f', {len(np.unique(self.labels))} label ids'
         return f'SemanticScan({len(self)} points{labels})'
+
+
+def _vector(value: ArrayLike, name: str) -> NDArray[np.float64]:
+    """Return a copy of a finite (3,) vector.
+
+    Raises
+    ------
+    InputError
+        It is none.
+    """
+    vector = as_numbers(value, name).astype(np.float64)
+    if vector.shape != (3,) or not np.isfinite(vector).all():
+        raise InputError(f'{name}: expected 3 finite numbers, got {vector.tolist()}')
+    return vector
+
+
+def _unit(vector: NDArray[np.float64], name: str) -> NDArray[np.float64]:
+    length = np.linalg.norm(vector)
+    if length == 0:
+        raise InputError(f'{name}: has no length')
+    return vector / length
 
 
 def _rounding(exact: NDArray[Any], kept: NDArray[np.float32]) -> float:

@@ -12,6 +12,11 @@ LEAST_SUPPORT = 0.45
 CLEAR_COUNT, CLEAR_SHARE, CLEAR_RATIO = 5, 0.003, 3.0
 """A pose is ruled out when its violations outnumber those of the answer by this count, by this
 share of the keypoints asked, and so many times."""
+CLEAR_NOISE = 0.5
+"""And by so many times those of the answer: even the right pose has some, of the same noise."""
+TOO_MANY = 0.0125
+"""A pose is ruled out, too, when its violations outnumber `CLEAR_RATIO` times those of the answer
+by this share of the keypoints asked, wherever they are."""
 SAME_ANGLE = np.radians(5.0)
 """With the maximum correspondence distance, the least difference of two poses."""
 
@@ -28,8 +33,11 @@ def ruled_out(answer: NDArray[np.int8], others: NDArray[np.int8]) -> NDArray[np.
     """
     support = (others == AGREES).sum(axis=1)
     against, back = exclusive_violations(answer, others)
-    out: NDArray[np.bool_] = against - back >= max(CLEAR_COUNT, CLEAR_SHARE * len(answer))
+    noise = CLEAR_NOISE * int((answer == VIOLATES).sum())
+    out: NDArray[np.bool_] = against - back >= max(CLEAR_COUNT, CLEAR_SHARE * len(answer)) + noise
     out &= against >= CLEAR_RATIO * back
+    many = (others == VIOLATES).sum(axis=1) - CLEAR_RATIO * int((answer == VIOLATES).sum())
+    out |= many >= TOO_MANY * len(answer)
     out |= support < LEAST_SUPPORT * (answer == AGREES).sum()
     return out
 
@@ -60,7 +68,11 @@ def exclusive_violations(answer: NDArray[np.int8], others: NDArray[np.int8]
 
 
 def best_supported(outcomes: NDArray[np.int8]) -> int:
-    """Return the row that no other row beats, beginning with the first."""
+    """Return the row that no other row beats, beginning with the first.
+
+    One beats another by exclusive violations, or by so much more support that beside it the other
+    explains too little.
+    """
     best = 0
     support = (outcomes == AGREES).sum(axis=1)
     for _ in range(len(outcomes)):
@@ -70,7 +82,11 @@ def best_supported(outcomes: NDArray[np.int8]) -> int:
         lead[(support < LEAST_SUPPORT * support[best]) | (back < CLEAR_RATIO * against)] = 0
         challenger = int(np.argmax(lead))
         if lead[challenger] < max(CLEAR_COUNT, CLEAR_SHARE * outcomes.shape[1]):
-            break
+            # or else the best supported one
+            standing = np.where(ruled_out(outcomes[best], outcomes), 0, support)
+            challenger = int(np.argmax(standing))
+            if support[best] >= LEAST_SUPPORT * standing[challenger]:
+                break
         best = challenger
     return best
 

@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 from ..common import se3
 from ..execution.threads import parallel_for
 from ..index.columns import window
-from ..index.range_image import direction
 from ..index.scan_index import ScanIndex
+from ..scan.directions import direction
 from ..scan.labels import UNLABELLED
 from ..scan.voxels import thin
+from .calibration import probability
 
 AGREES, UNOBSERVED, VIOLATES = 1, 0, -1
 """Outcomes of a keypoint: on a surface, not seen by the other sensor, in free space."""
@@ -32,9 +33,7 @@ MARGIN, MARGIN_SHARE = 0.5, 0.02
 """A point violates free space when it is nearer than all that was measured around its direction,
 by this share of the maximum correspondence distance and this share of the range."""
 VIOLATION_WEIGHT = 5.0
-"""A violation weighs so many agreements: the right pose has hardly any."""
-PRIOR_AGAINST = 0.01
-"""Share of keypoints that counts against every pose: a handful of agreements is no evidence."""
+"""A violation weighs so many agreements where poses are ranked: the right one has hardly any."""
 ROUGH_KEYPOINTS = 400
 """Keypoints scored for each hypothesis of the solver."""
 
@@ -56,8 +55,8 @@ class PoseScore:
 
     @property
     def confidence(self) -> float:
-        """The share of the agreements among what counts for or against the pose, 0 to 1."""
-        return self.overlap / (self.overlap + VIOLATION_WEIGHT * self.violations + PRIOR_AGAINST)
+        """The probability that the pose is right where no other competes with it, 0 to 1."""
+        return probability(self.overlap, self.violations)
 
 
 def pose_score(outcomes: NDArray[np.int8]) -> PoseScore:
@@ -108,13 +107,14 @@ def _one_way(source: ScanIndex, target: ScanIndex, T: NDArray[np.float64], keypo
     parallel_for(_outcomes, outcomes.size, source.points[rows], source.labels[rows],
                  np.ascontiguousarray(T), columns.points, target.column_normals,
                  target.column_labels, columns.first, columns.ny, columns.low, columns.edge,
-                 target.ranges, reach, near * near, margin, outcomes)
+                 target.ranges, target.origin, reach, near * near, margin, outcomes)
     return outcomes
 
 
 @numba.njit(cache=True, nogil=True)
 def _outcomes(first, last, points, labels, T, others, normals,
-              other_labels, columns, ny, low, edge, ranges, reach, limit, margin, outcomes):
+              other_labels, columns, ny, low, edge, ranges, origin, reach, limit, margin,
+              outcomes):
     for task in range(first, last):
         h, i = task // len(points), task % len(points)
         x = T[h, 0, 0] * points[i, 0] + T[h, 0, 1] * points[i, 1] + T[h, 0, 2] * points[i, 2] \
@@ -127,6 +127,7 @@ def _outcomes(first, last, points, labels, T, others, normals,
                        reach, limit):
             outcomes[h, i] = AGREES
             continue
+        x, y, z = x - origin[0], y - origin[1], z - origin[2]
         r = math.sqrt(x * x + y * y + z * z)
         if r > 0:
             a, e = direction(np.float32(x), np.float32(y), np.float32(z))

@@ -32,7 +32,7 @@ SCALE_CONFIDENCE = 0.5
 
 
 def frame_hint(points: NDArray[np.float32], config: SgorConfig) -> str:
-    """Say why (N, 3) points may be no metres in the frame of a sensor; empty: they may be.
+    """Say why (N, 3) points, relative to the sensor, may be no metres; empty: they may be.
 
     The origin of a scan is the sensor, and a sensor sees most of what is next to it.
     """

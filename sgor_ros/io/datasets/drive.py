@@ -41,6 +41,10 @@ class DriveScan:
     label_convention: str
     read: Callable[[], SemanticScan]
 
+    def without_labels(self) -> Self:
+        """Return the same scan without labels."""
+        return replace(self, read=partial(_unlabelled, self))
+
 
 @dataclass(frozen=True, eq=False)
 class Drive:
@@ -88,8 +92,7 @@ class Drive:
 
     def without_labels(self) -> Self:
         """Return the same drive with scans that have no labels."""
-        return replace(self, scans=[replace(scan, read=partial(_unlabelled, scan))
-                                    for scan in self.scans])
+        return replace(self, scans=[scan.without_labels() for scan in self.scans])
 
     @property
     def frames(self) -> Sequence[DriveScan]:

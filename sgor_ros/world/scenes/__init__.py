@@ -11,6 +11,7 @@ import numpy as np
 from .courtyard import courtyard
 from .indoors import corridor
 from .indoors import garage
+from .indoors import hall
 from .open_land import field
 from .open_land import orchard
 from .open_land import parking
@@ -20,6 +21,7 @@ from .poses import random_pair
 from .poses import random_pose
 from .roadside import facade
 from .roadside import highway
+from .stairs import stairs
 from .tunnels import road_tunnel
 from .tunnels import tunnel
 
@@ -66,6 +68,8 @@ KINDS = {
     'parking_regular': Kind(parking, unique=False),
     'parking_jittered': Kind(partial(parking, jittered=True), unique=True),
     'courtyard': Kind(courtyard, unique=True, distances=(1.0, 12.0), step=0.3),
+    'hall': Kind(hall, unique=True, distances=(1.0, 12.0), step=0.3),
+    'stairs': Kind(stairs, unique=True, distances=(1.0, 8.0), step=0.3),
 }
 """All kinds by name."""
 

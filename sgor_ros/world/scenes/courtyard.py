@@ -26,7 +26,7 @@ def courtyard(rng: np.random.Generator) -> Place:
     """Build a yard of 18 x 20 m or so, with windows, doors, furniture and plants."""
     long = rng.uniform(17.0, 23.0)
     wide = long - rng.uniform(0.0, 4.0)
-    plot = Plot(rng, _round(long / 2 - 4.0, wide / 2 - 4.0))
+    plot = Plot(rng, rounded(long / 2 - 4.0, wide / 2 - 4.0))
     storeys, designs = int(rng.integers(2, 5)), rng.integers(2**32, size=4)
     own = int(rng.choice([1, 2, 4]))    # one design for all sides, for opposite ones, or none
     for side in range(4):
@@ -36,7 +36,7 @@ def courtyard(rng: np.random.Generator) -> Place:
         plot.add(BUILDING, place(wall, np.array([np.sin(yaw), -np.cos(yaw), 0.0]) * away / 2,
                                  yaw))
     plot.floor(SIDEWALK, (-long / 2 - 1.5, long / 2 + 1.5, -wide / 2 - 1.5, wide / 2 + 1.5))
-    things = (_table, _bench, _planter, tree, bush, bins)
+    things = (table, bench, _planter, tree, bush, bins)
     for spot in rng.uniform((1.6 - long / 2, 1.6 - wide / 2), (long / 2 - 1.6, wide / 2 - 1.6),
                             (int(rng.integers(30, 60)), 2)):
         if plot.room(spot, 0.9, 0.6):
@@ -46,7 +46,7 @@ def courtyard(rng: np.random.Generator) -> Place:
                   closed=True, sensor_height=1.0, clearance=0.5)
 
 
-def _round(a: float, b: float) -> Array:
+def rounded(a: float, b: float) -> Array:
     """Draw a rounded rectangle of half sides a and b, (M, 2), m."""
     t = np.linspace(0.0, 2 * np.pi, 600, endpoint=False)
     cos, sin = np.cos(t), np.sin(t)
@@ -54,14 +54,16 @@ def _round(a: float, b: float) -> Array:
                             b * np.sign(sin) * np.abs(sin) ** 0.6])
 
 
-def _table(rng: np.random.Generator) -> Parts:
+def table(rng: np.random.Generator) -> Parts:
+    """Table on four legs."""
     a, b = rng.uniform(0.4, 0.9), rng.uniform(0.35, 0.5)
     legs = [box((x - 0.04, x + 0.04), (y - 0.04, y + 0.04), (0.0, 0.7))
             for x in (0.1 - a, a - 0.1) for y in (0.1 - b, b - 0.1)]
     return [(OTHER_OBJECT, np.concatenate([box((-a, a), (-b, b), (0.7, 0.75)), *legs]))]
 
 
-def _bench(rng: np.random.Generator) -> Parts:
+def bench(rng: np.random.Generator) -> Parts:
+    """Bench with a back."""
     a = rng.uniform(0.6, 1.0)
     return [(OTHER_OBJECT, np.concatenate([
         box((-a, a), (-0.22, 0.22), (0.4, 0.46)), box((-a, a), (-0.24, -0.19), (0.5, 0.9)),

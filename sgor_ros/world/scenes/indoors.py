@@ -1,4 +1,4 @@
-"""Indoors: a corridor and a parking garage."""
+"""Indoors: a corridor, a parking garage and a hall."""
 
 from __future__ import annotations
 
@@ -12,6 +12,9 @@ from ..labels import PARKING
 from ..objects import car
 from ..shapes import box
 from ..shapes import place
+from .courtyard import bench
+from .courtyard import rounded
+from .courtyard import table
 from .place import finish
 from .place import Place
 from .place import straight
@@ -76,3 +79,31 @@ def garage(rng: np.random.Generator, full: float = 0.0) -> Place:
     reach = min(half - 2.0, 45.0)
     return finish(plot, (-reach, reach, 2.0 - wide, wide - 2.0),
                   repeats=(np.inf if full else bay, np.inf))
+
+
+def hall(rng: np.random.Generator) -> Place:
+    """Build a hall of 25 x 17 m or so: doors and pillars at its walls, tables and benches."""
+    half, wide = rng.uniform(11.0, 15.0), rng.uniform(7.5, 9.5)
+    top = float(rng.choice([4.5, 6.0, 7.5]))
+    plot = Plot(rng, rounded(half - 3.0, wide - 3.0))
+    plot.floor(OTHER_GROUND, (-half - 1.0, half + 1.0, -wide - 1.0, wide + 1.0))
+    plot.add(OTHER_STRUCTURE, extrude([(-wide, top), (wide, top)], -half, half))
+    for side in range(4):
+        length, away = (half, wide) if side % 2 == 0 else (wide, half)
+        begins = np.arange(0.8 - length, length - 3.0, 4.0) + rng.uniform(0.0, 1.5)
+        depths = np.asarray(rng.choice([0.15, 0.5, 0.9], len(begins)), float)
+        wall = niches(begins, begins + rng.uniform(0.9, 2.2, len(begins)), 0.0, 2.3, depths,
+                      (-length, length), top)
+        yaw = side * np.pi / 2
+        plot.add(BUILDING, place(wall, np.array([np.sin(yaw), -np.cos(yaw), 0.0]) * away, yaw))
+    pillar = [(OTHER_STRUCTURE, box((-0.25, 0.25), (-0.25, 0.25), (0.0, top)))]
+    for x in np.arange(1.5 - half, half - 1.0, float(rng.choice([4.0, 5.0]))):
+        for y in (0.6 - wide, wide - 0.6):
+            plot.put(pillar, (x, y))
+    for spot in rng.uniform((1.5 - half, 1.5 - wide), (half - 1.5, wide - 1.5),
+                            (int(rng.integers(20, 40)), 2)):
+        if plot.room(spot, 0.9, 0.6):
+            thing = (table, bench)[int(rng.integers(2))]
+            plot.put(thing(rng), spot, rng.uniform(0.0, 2 * np.pi))
+    return finish(plot, (1.5 - half, half - 1.5, 1.5 - wide, wide - 1.5), closed=True,
+                  sensor_height=1.0, clearance=0.5)

@@ -38,6 +38,8 @@ class Place(Scene):
         Least distance of a sensor to what stands there, m.
     repeats : (float, float)
         It is the same again so far on along x and along y, m: 0 anywhere, infinity nowhere.
+    follows_slope : bool
+        Whether a sensor pitches with the ground, as on a car, or is carried level.
     """
 
     area: Rectangle
@@ -48,14 +50,16 @@ class Place(Scene):
     sensor_height: float
     clearance: float
     repeats: tuple[float, float]
+    follows_slope: bool = True
 
 
 def finish(plot: Plot, area: Rectangle, *, closed: bool = False, sensor_height: float = 1.7,
            clearance: float = 0.8,
-           repeats: tuple[float, float] = (np.inf, np.inf)) -> Place:
+           repeats: tuple[float, float] = (np.inf, np.inf),
+           follows_slope: bool = True) -> Place:
     """Close a plot: nothing is built after that; the parameters are those of `Place`."""
     return Place(*close(plot.triangles, {}), area, plot.boxes, plot.path, closed, plot.height,
-                 sensor_height, clearance, repeats)
+                 sensor_height, clearance, repeats, follows_slope)
 
 
 def straight(length: float, y: float = 0.0) -> Array:

@@ -123,12 +123,12 @@ def _stand(place: Place, spot: Array, rng: np.random.Generator) -> Array:
 
 
 def _poses(place: Place, spot: Array, yaw: Array, pitch: Array, roll: Array) -> Array:
-    """Poses (N, 4, 4) above spots (N, 2), in the slope of the ground, tilted further."""
+    """Poses (N, 4, 4) above spots (N, 2), level or in the slope of the ground, tilted further."""
     ahead = np.column_stack([np.cos(yaw), np.sin(yaw)])
     left = np.column_stack([-ahead[:, 1], ahead[:, 0]])
     rise, bank = ((place.ground_height(spot + _BASE * way)
                    - place.ground_height(spot - _BASE * way)) / (2 * _BASE)
-                  for way in (ahead, left))
+                  * place.follows_slope for way in (ahead, left))
     x = _unit(np.column_stack([ahead, np.tan(np.arctan(rise) + pitch)]))
     y = np.column_stack([left, np.tan(np.arctan(bank) + roll)])
     z = _unit(np.cross(x, y))

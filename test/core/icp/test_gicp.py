@@ -6,10 +6,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from sgor_ros import SgorConfig
-from sgor_ros.core.icp import covariance
 from sgor_ros.core.icp.covariance import correlated_error
-from sgor_ros.core.icp.covariance import correlated_part
-from sgor_ros.core.icp.covariance import scattered
 from sgor_ros.core.icp.gicp import align
 from sgor_ros.core.index.surface import surface
 from sgor_ros.core.scan.voxels import voxel_grid
@@ -78,12 +75,8 @@ def test_covariance_turns_with_the_target_frame(clouds, move):
     np.testing.assert_allclose(noise(moved) / scale, expected / scale, atol=0.03)
 
 
-def test_covariance_is_of_the_source_frame_in_the_target(clouds, monkeypatch):
-    """Moving the source's origin by a lever gives the covariance of that lever's end.
-
-    But for the widening, which depends on where the sensor is.
-    """
-    monkeypatch.setattr(covariance, 'SCATTERED', 0)
+def test_covariance_is_of_the_source_frame_in_the_target(clouds):
+    """Moving the source's origin by a lever gives the covariance of that lever's end."""
     source, target, truth = clouds
     plain = aligned(source, target, truth)
     shift = motion(-20, 8, 2, 0)
@@ -115,28 +108,6 @@ def test_clouds_without_overlap_end_without_a_covariance(clouds):
     found = aligned(source, target, motion(1000, 0, 0, 0))
     assert found.pairs == 0
     assert found.covariance is None
-
-
-def test_what_only_scattered_things_hold_is_wider():
-    """Sigmas of 1 mm stay, of 15 mm grow six times; turns as seen far away."""
-    sigma = np.array([0.001, 0.015, 0.002, 0.001 / 20, 0.015 / 20, 0.002 / 20])
-    rng = np.random.default_rng(0)
-    turn = np.kron(np.eye(2), Rotation.random(rng=rng).as_matrix())
-    wider = turn.T @ scattered(turn @ np.diag(sigma**2) @ turn.T, 20.0, 0.5) @ turn
-    np.testing.assert_allclose(np.sqrt(np.diag(wider)) / sigma, [1, 6.4, 1.4, 1, 6.4, 1.4],
-                               atol=0.1)
-    np.testing.assert_allclose(wider, np.diag(np.diag(wider)), atol=1e-9)
-
-
-def test_what_scattered_things_add_errs_alike_in_part():
-    """A quarter of the variance that they add; what surfaces hold repeats as it did."""
-    root = correlated_error(motion(0.3, 0, 0, 0), middle_range=20.0, edge=0.5)
-    random = np.diag([1e-6] * 3 + [1e-9] * 3)
-    both = correlated_part(root, random, random)
-    np.testing.assert_allclose(both, root, atol=1e-9)
-    both = correlated_part(root, random, random + np.diag([0, 4e-4, 0, 0, 0, 0]))
-    np.testing.assert_allclose(both @ both.T - root @ root.T, np.diag([0, 1e-4, 0, 0, 0, 0]),
-                               atol=1e-9)
 
 
 def test_systematic_errors_grow_with_the_motion_up_to_an_edge_of_the_grid():

@@ -1,5 +1,6 @@
 """What the clouds say about a transformation: partners and free space."""
 from conftest import relative
+from galleries import seen
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -7,7 +8,6 @@ from scipy.spatial.transform import Rotation
 from sgor_ros import preprocess
 from sgor_ros import SemanticScan
 from sgor_ros.core.features.features import Features
-from sgor_ros.core.index.range_image import range_image
 from sgor_ros.core.index.scan_index import scan_index
 from sgor_ros.core.scoring.pose_scoring import pose_score
 from sgor_ros.core.scoring.pose_scoring import rough_scores
@@ -33,7 +33,7 @@ def keypoints(points, labels):
 
 def view_of(points, keys, facing=(-1.0, 0.0, 0.0)):
     """Return the view of a sensor whose keypoints all face one way."""
-    return scan_index(range_image(points), keys, np.tile(facing, (len(keys.points), 1)), UP, REACH)
+    return scan_index(seen(points), keys, np.tile(facing, (len(keys.points), 1)), UP, REACH)
 
 
 @pytest.fixture(scope='module')
