@@ -112,9 +112,20 @@ class Mapper:
         edge = Edge(target, source, loop.T_target_source, loop.covariance, Kind.LOOP)
         return tuple(self._loop_of(closed) for closed in self._offer([edge]))
 
-    def trajectory(self) -> Trajectory:
-        """Return the optimised pose of every scan that has one."""
-        return self._odometry.trajectory(self.graph)
+    def trajectory(self, *, loops: bool = True) -> Trajectory:
+        """Return the optimised pose of every scan that has one, or that by odometry alone."""
+        return self._odometry.trajectory(self.graph, loops=loops)
+
+    def node_stamps_ns(self) -> dict[int, int]:
+        """Return the stamp of each node of the graph, nanoseconds."""
+        return {node.id: node.stamp_ns for node in self._odometry.nodes.values()}
+
+    def node_poses(self) -> tuple[list[int], Array]:
+        """Return stamps, nanoseconds, and T_map_sensor (N, 4, 4) of nodes joined to the first."""
+        part = self.graph.part(self.graph.nodes[0])
+        nodes = [node for node in self.graph.nodes if self.graph.part(node) == part]
+        stamps_ns = self.node_stamps_ns()
+        return [stamps_ns[node] for node in nodes], self.graph.poses(nodes)
 
     def _add_node(self, node: Node, edge: Edge | None, prepared: PreparedScan,
                   T_map_sensor: Array) -> None:

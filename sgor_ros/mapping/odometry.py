@@ -116,13 +116,14 @@ class Odometry:
         self._anchors.append(node)
         self._T_anchor_sensor.append(T_node_sensor)
 
-    def trajectory(self, graph: PoseGraph) -> Trajectory:
-        """Return the pose of each scan in the map."""
+    def trajectory(self, graph: PoseGraph, *, loops: bool = True) -> Trajectory:
+        """Return the pose of each scan in the map, or by odometry alone."""
         anchors, rows = np.unique(np.array(self._anchors, np.int64), return_inverse=True)
         nodes = anchors.tolist()
+        poses = graph.poses(nodes) if loops else graph.poses_by_odometry(nodes)
         T_anchor_sensor = np.array(self._T_anchor_sensor).reshape(-1, 4, 4)
         return Trajectory(
-            np.array(self._stamps_ns, np.int64), graph.poses(nodes)[rows] @ T_anchor_sensor,
+            np.array(self._stamps_ns, np.int64), poses[rows] @ T_anchor_sensor,
             np.array([graph.part(node) for node in nodes], np.int64)[rows])
 
 

@@ -81,6 +81,10 @@ class PoseGraph:
         """Return T_map_sensor of some nodes, (N, 4, 4)."""
         return self._poses[[self._row[node] for node in nodes]]
 
+    def poses_by_odometry(self, nodes: Sequence[int]) -> Array:
+        """Return T_map_sensor of some nodes without loops, (N, 4, 4)."""
+        return self._by_odometry()[[self._row[node] for node in nodes]]
+
     def part(self, node: int) -> int:
         """Return the number of the connected part that a node is in."""
         row = self._row[node]
