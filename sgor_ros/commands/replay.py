@@ -97,6 +97,7 @@ def replay(arguments: Namespace) -> int:
         if mapper is not None:
             T_base_sensor = np.eye(4) if mount is None else mount(0, '')
             assert not isinstance(T_base_sensor, str), 'it is fixed'
+            mapper.finish()
             summary['map'] = write_map(place, mapper, rows, T_base_sensor,
                                        sequence.T_world_sensor, title)
         write_results(place, rows, summary, title)

@@ -2,8 +2,9 @@
 
 `mapper` is the way of one scan. Beside it: `odometry` (nodes and edges out of tracked scans),
 `keyframe` (what is kept of a scan), `retrieval` (which look alike), `candidates` (which pairs to
-try and when), `loop_consistency` (which loops to believe, by `paths`: the surest way between two
-nodes), `pose_graph` (GTSAM), `edge` and `result` (what goes in and out).
+try and when), `verification` (they are registered), `loop_consistency` (which loops to believe, by
+`paths`: the surest way between two nodes), `pose_graph` (GTSAM), `edge` and `result` (what goes in
+and out). `map_cloud` (the map as one cloud).
 """
 from .config import MapperConfig
 from .mapper import Mapper

@@ -55,15 +55,15 @@ class Candidates:
         while len(self._waiting) > limit:
             self.put_off += len(self._waiting.popleft()[2])
 
-    def next(self) -> Candidate | None:
-        """Return the pair to try next; None where nothing waits."""
-        if not self._waiting:
-            return None
-        source, prepared, targets = self._waiting[-1]
-        candidate = Candidate(source, prepared, targets.popleft())
-        if not targets:
-            self._waiting.pop()
-        return candidate
+    def take(self, count: int) -> list[Candidate]:
+        """Return up to so many pairs to try next; they do not wait any more."""
+        taken: list[Candidate] = []
+        while self._waiting and len(taken) < count:
+            source, prepared, targets = self._waiting[-1]
+            taken.append(Candidate(source, prepared, targets.popleft()))
+            if not targets:
+                self._waiting.pop()
+        return taken
 
 
 @dataclass(frozen=True, eq=False)

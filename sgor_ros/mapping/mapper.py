@@ -1,4 +1,5 @@
 """The way of a scan through the mapper, on one screen."""
+from concurrent.futures import Executor
 from dataclasses import fields
 from itertools import combinations
 
@@ -6,11 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.common import se3
-from ..core.config import prepares_alike
 from ..core.config import SgorConfig
 from ..core.prepared_scan import PreparedScan
 from ..core.preprocessing import preprocess
-from ..core.registration import register
 from ..core.scan.scan import SemanticScan
 from ..tracker import State
 from ..tracker import TrackedScan
@@ -30,6 +29,7 @@ from .pose_graph import PoseGraph
 from .result import Loop
 from .result import MappedScan
 from .result import Trajectory
+from .verification import Verification
 
 Array = NDArray[np.float64]
 
@@ -41,6 +41,15 @@ class Mapper:
     """Tracks each scan, closes loops among keyframes, and keeps all poses optimised.
 
     Without GTSAM it goes on as odometry, and says so once.
+
+    Parameters
+    ----------
+    config : SgorConfig, optional
+    tracker_config : TrackerConfig, optional
+    mapper_config : MapperConfig, optional
+    executor : concurrent.futures.Executor, optional
+        Where candidates of loops are registered, in processes of its own; without it here, with
+        each scan a few.
 
     Attributes
     ----------
@@ -56,7 +65,8 @@ class Mapper:
 
     def __init__(self, config: SgorConfig | None = None,
                  tracker_config: TrackerConfig | None = None,
-                 mapper_config: MapperConfig | None = None) -> None:
+                 mapper_config: MapperConfig | None = None, *,
+                 executor: Executor | None = None) -> None:
         self.tracker = Tracker(config, tracker_config)
         self.mapper_config = MapperConfig.given(mapper_config)
         self.graph = PoseGraph()
@@ -64,6 +74,7 @@ class Mapper:
         self.consistency = LoopConsistency()
         self.candidates = Candidates()
         self._odometry = Odometry()
+        self._verification = Verification(executor)
         self._closes_loops = bool(self.mapper_config.registrations_per_scan
                                   and not self.graph.missing)
         self._notes = [self.graph.missing] if self.graph.missing else []
@@ -92,12 +103,20 @@ class Mapper:
             if added is not None:
                 assert prepared is not None, 'a keyframe comes with its prepared scan'
                 self._add_node(*added, prepared, T_map_sensor)
-        loops = self._work()
+        # where a track begins, its place in the map is what the scan is waited for
+        loops = self._work(at_once=tracked.restarted)
         notes, self._notes = self._notes, []
         told = {item.name: getattr(tracked, item.name) for item in fields(tracked)}
         return MappedScan(**{**told, 'warnings': (*tracked.warnings, *notes)},
                           loops=tuple(self._loop_of(edge) for edge in loops),
                           T_map_odom=self._T_map_odom(tracked))
+
+    def finish(self) -> tuple[Loop, ...]:
+        """Work on all candidates that wait, however long it takes; return the loops closed."""
+        closed: list[Edge] = []
+        while self._closes_loops and (len(self.candidates) or len(self._verification)):
+            closed += self._work(wait=True)
+        return tuple(self._loop_of(edge) for edge in closed)
 
     def offer(self, loop: Loop) -> tuple[Loop, ...]:
         """Take a loop from elsewhere; return those that are believed now that there is one more.
@@ -153,25 +172,24 @@ class Mapper:
             return False
         prepared = preprocess(scan, self.tracker.config)
         alike = self.keyframes.alike(prepared)[:count]
-        found = [loop for target in alike if (
-            loop := self._registered(Candidate(NOWHERE, prepared, target))) is not None]
+        found = [Edge(target, NOWHERE, *seen, Kind.LOOP) for target in alike if (
+            seen := self._verification.one(Candidate(NOWHERE, prepared, target), self.keyframes,
+                                           self.tracker.config)) is not None]
         if not any(self.consistency.agree(*pair) for pair in combinations(found, 2)):
             return False
         at = self.graph.pose(found[0].target) @ found[0].T_target_source
         way = at[:3, 3] - self._odometry.last_pose(self.graph)[:3, 3]
         return float(np.linalg.norm(way)) > self.mapper_config.loop_radius * prepared.scale
 
-    def _work(self) -> list[Edge]:
+    def _work(self, *, at_once: bool = False, wait: bool = False) -> list[Edge]:
         """Register candidates, as many as there is time for; return the loops believed now."""
-        found: list[Edge] = []
-        for _ in range(self.mapper_config.registrations_per_scan):
-            candidate = self.candidates.next()
-            if candidate is None:
-                break
-            loop = self._registered(candidate)
-            if loop is not None:
-                found.append(loop)
-        return self._offer(found)
+        found = self._verification.work(
+            self.candidates, self.keyframes, self.tracker.config,
+            self.mapper_config.registrations_per_scan, at_once=at_once, wait=wait)
+        if self._verification.fault and self._closes_loops:
+            self._closes_loops = False
+            self._notes.append(self._verification.fault)
+        return self._offer(found) if found else []
 
     def _offer(self, loops: list[Edge]) -> list[Edge]:
         """Return the loops that are believed now, closed in the graph."""
@@ -189,18 +207,6 @@ class Mapper:
             self.consistency.begin_anew(self.graph.edges)
             closed += [edge for edge in kept if id(edge) not in before]
         return closed
-
-    def _registered(self, candidate: Candidate) -> Edge | None:
-        """Register a pair; a loop only where the clouds leave one answer, in all directions."""
-        target = self.keyframes.restored(candidate.target)
-        source = candidate.prepared
-        if source.scale != target.scale or not prepares_alike(source.config, target.config):
-            return None
-        found = register(source, target, self.tracker.config)
-        if not found.success or found.T_target_source is None or found.covariance is None:
-            return None
-        return Edge(candidate.target, candidate.source, found.T_target_source, found.covariance,
-                    Kind.LOOP)
 
     def _loop_of(self, edge: Edge) -> Loop:
         nodes = self._odometry.nodes

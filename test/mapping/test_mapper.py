@@ -1,5 +1,6 @@
 """The mapper on a street that is driven down and, in the other lane, back."""
 from dataclasses import fields
+import multiprocessing
 import subprocess
 import sys
 
@@ -7,6 +8,9 @@ from conftest import errors
 from conftest import relative
 import numpy as np
 import pytest
+from return_drive import return_drive
+from return_drive import THERE
+from return_drive import TURN
 
 from sgor_ros import InputError
 from sgor_ros import Loop
@@ -19,24 +23,18 @@ from sgor_ros import Tracker
 from sgor_ros import TrackerConfig
 from sgor_ros.core.common import se3
 from sgor_ros.mapping.edge import Kind
-from sgor_ros.world import Lidar
-from sgor_ros.world.return_trip import there_and_back
-from sgor_ros.world.street import loop_trajectory
-from sgor_ros.world.street import street_scene
+from sgor_ros.pipeline.loop_process import end
+from sgor_ros.pipeline.loop_process import loop_process
 
 pytest.importorskip('gtsam')
 
-LANE_M = 2.6
 PERIOD_NS = 100_000_000
-THERE, TURN = 22, 8
 
 
 @pytest.fixture(scope='module')
 def drive():
-    """Return scans 2 m apart, 42 m there and back, with their true poses."""
-    scene, lidar, rng = street_scene(0), Lidar(beams=32, columns=900), np.random.default_rng(0)
-    poses = there_and_back(loop_trajectory(scene, THERE, speed=20.0), LANE_M, TURN)
-    return [(SemanticScan(*lidar.scan(scene, T, rng)), T) for T in poses]
+    """Return scans with their true poses."""
+    return [(SemanticScan(points, labels), T) for points, labels, T in return_drive()]
 
 
 def mapped(mapper, drive, start=0):
@@ -185,6 +183,36 @@ def test_in_consecutive_mode_few_scans_become_nodes(drive):
 def test_a_configuration_of_another_kind_is_refused():
     with pytest.raises(InputError, match='config: expected MapperConfig'):
         Mapper(mapper_config={'loop_radius': 20.0})
+
+
+def test_pairs_may_be_registered_in_another_process(drive):
+    executor = loop_process()
+    try:
+        mapper = Mapper(executor=executor)
+        loops = [loop for scan in mapped(mapper, drive) for loop in scan.loops]
+        loops += mapper.finish()
+    finally:
+        end(executor)
+    assert len(mapper.candidates) == 0
+    assert len(loops) == len(mapper.graph.loops) > 5
+    assert worst(mapper.trajectory(), drive) < 0.1
+
+
+def test_where_the_other_process_dies_odometry_goes_on(drive):
+    executor = loop_process()
+    try:
+        mapper = Mapper(executor=executor)
+        mapped(mapper, drive[:THERE + TURN])
+        assert len(mapper.candidates) == 0
+        process, = multiprocessing.active_children()
+        process.kill()
+        process.join()
+        tracked = mapped(mapper, drive[THERE + TURN:], THERE + TURN)
+    finally:
+        end(executor)
+    assert all(scan.success for scan in tracked)
+    told = [text for scan in tracked for text in scan.warnings if 'not closed any more' in text]
+    assert len(told) == 1
 
 
 WITHOUT = """

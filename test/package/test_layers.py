@@ -125,7 +125,7 @@ def test_the_rooms_of_the_node_do_not_know_the_node():
 
 
 MAPPING = ('config', 'edge', 'result', 'retrieval', 'paths', 'pose_graph', 'odometry', 'keyframe',
-           'loop_consistency', 'candidates', 'mapper')
+           'map_cloud', 'loop_consistency', 'candidates', 'verification', 'mapper')
 
 
 def test_the_files_of_mapping_lie_on_each_other():

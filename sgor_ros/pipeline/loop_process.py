@@ -1,0 +1,36 @@
+"""A process for loops, that only gets what the cores have left over."""
+from concurrent.futures import ProcessPoolExecutor
+import ctypes
+import multiprocessing
+import os
+import signal
+
+from ..core.execution.cache import choose_cache_folder
+
+LEAST_NICE = 19
+DIE_WITH_PARENT = 1
+"""PR_SET_PDEATHSIG of Linux."""
+
+
+def loop_process() -> ProcessPoolExecutor:
+    """Return an executor with one process of the lowest priority; it starts with the first pair.
+
+    A thread would take its turns from that of the scans.
+    """
+    # threads of the parent do not survive a fork
+    return ProcessPoolExecutor(1, multiprocessing.get_context('spawn'), _prepare)
+
+
+def end(executor: ProcessPoolExecutor) -> None:
+    """End the process, whatever it is at."""
+    executor.shutdown(wait=False, cancel_futures=True)
+    for child in multiprocessing.active_children():
+        child.kill()
+
+
+def _prepare() -> None:
+    """Run in the process before anything else."""
+    os.nice(LEAST_NICE)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)    # a terminal sends it to all; the node decides
+    ctypes.CDLL(None).prctl(DIE_WITH_PARENT, signal.SIGKILL)
+    choose_cache_folder()
