@@ -1,19 +1,21 @@
-"""A process for loops, that only gets what the cores have left over."""
+"""A process for loops, that gets what the scans leave over."""
 from concurrent.futures import ProcessPoolExecutor
 import ctypes
+from importlib import import_module
 import multiprocessing
 import os
 import signal
 
 from ..core.execution.cache import choose_cache_folder
 
-LEAST_NICE = 19
+NICE = 10
+"""The scans come first, and where others want the cores too there is some left for it."""
 DIE_WITH_PARENT = 1
 """PR_SET_PDEATHSIG of Linux."""
 
 
 def loop_process() -> ProcessPoolExecutor:
-    """Return an executor with one process of the lowest priority; it starts with the first pair.
+    """Return an executor with one process of low priority; it starts with the first pair.
 
     A thread would take its turns from that of the scans.
     """
@@ -30,7 +32,8 @@ def end(executor: ProcessPoolExecutor) -> None:
 
 def _prepare() -> None:
     """Run in the process before anything else."""
-    os.nice(LEAST_NICE)
+    os.nice(NICE)
     signal.signal(signal.SIGINT, signal.SIG_IGN)    # a terminal sends it to all; the node decides
     ctypes.CDLL(None).prctl(DIE_WITH_PARENT, signal.SIGKILL)
     choose_cache_folder()
+    import_module('..mapping.verification', __package__)    # compiled code takes a second to load

@@ -136,6 +136,8 @@ class SgorNode(Node):
         begin = time.monotonic()
         with forwarded(log):
             warm_up(self._settings.live[0])
+        if self._loops is not None:
+            self._loops.submit(int)    # anything: it starts
         log.info(f'ready after {time.monotonic() - begin:.1f} s, waiting for clouds on '
                  f'{self._stream.name}')
 
