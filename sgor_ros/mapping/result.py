@@ -1,6 +1,7 @@
 """What the mapper returns: `Loop`, `MappedScan`, `Trajectory`."""
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,5 +69,5 @@ class Trajectory:
     T_map_sensor: Array
     part: NDArray[np.int64]
 
-    def __iter__(self) -> Iterator[NDArray[np.int64] | Array]:
+    def __iter__(self) -> Iterator[NDArray[Any]]:
         return iter((self.stamps_ns, self.T_map_sensor))
