@@ -62,8 +62,8 @@ class SgorConfig(Ablation):
         0.6, 'Correspondences nearer than this under the best hypothesis refine it', 'm',
         minimum=0.005, maximum=5.0, group='thresholds')
     min_confidence: float = setting(
-        0.8, 'Results that are right with less probability are failures: at 0.8 a wrong one costs '
-        'what four right ones are worth; 0: accept all',
+        0.85, 'Results that are right with less probability are failures: at 0.85 a wrong one '
+        'costs what six right ones are worth; 0: accept all',
         minimum=0.0, maximum=1.0, group='trust')
     hypothesis_radius: float = setting(
         30.0, 'Other placements that explain the scans are looked for so far from the answer; 0: '

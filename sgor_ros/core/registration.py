@@ -42,6 +42,9 @@ from .verdict.result import Registration
 
 Scan = SemanticScan | PreparedScan
 
+FEWEST_INLIERS = 5
+"""Enough for a pose that the clouds bear out: far apart, scans have few matches in common."""
+
 
 @dataclass(frozen=True, eq=False)
 class Attempt:
@@ -153,6 +156,8 @@ def _attempts(config: SgorConfig, *, labelled: bool, level: bool) -> Iterator[Sg
     there are none, without what stands around, which from afar looks another. Where the ground
     planes may be of walls or tables, nothing stands around, and whatever is level is tried too.
     """
+    # of those that are few, too, the clouds decide
+    config = config.replace(min_inliers=min(config.min_inliers, FEWEST_INLIERS))
     if not labelled:
         config = config.replace(semantics='none')
         less = config.replace(context_weight=0.0)

@@ -1,5 +1,7 @@
 """Where it goes, a file or a viewer, and what all views draw alike."""
+import logging
 from pathlib import Path
+import threading
 from types import TracebackType
 from typing import Self
 
@@ -9,8 +11,10 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from ..core.common import se3
+from ..core.common.settings import InputError
 from ..core.scan.ground import Ground
 from ..core.verdict.result import Registration
+from . import viewer_program
 
 Array = NDArray[np.float64]
 
@@ -27,30 +31,68 @@ RINGS = (0.5, 1.0)
 POINT_SIZE = -1.5
 """Negative: pixels, and not metres."""
 
+PATIENCE_S = 10.0
+"""For a viewer to take what was sent: one that was closed never does, and rerun waits for ever."""
+
+LOGGER = logging.getLogger('sgor_ros')
+
 
 class Recording:
     """A stream of rerun; use it in a ``with``.
+
+    A viewer that ends, or a disk that is full, ends the view and not the work: it is logged once.
 
     Parameters
     ----------
     target : str or Path
         An ``.rrd`` to write; empty: a viewer is opened.
+
+    Attributes
+    ----------
+    broken : bool
+        Whether nothing more can be shown.
+    live : bool
+        Whether it goes to a viewer.
+
+    Raises
+    ------
+    InputError
+        The viewer does not start.
     """
 
     def __init__(self, target: str | Path) -> None:
         self.stream = rr.RecordingStream('sgor_ros')
+        self.broken = False
+        self.live = not target
         if target:
             self.stream.save(target)
-        else:
-            self.stream.spawn(memory_limit='2GB')
+            return
+        try:
+            rr.spawn(memory_limit='2GB', executable_path=viewer_program(), recording=self.stream)
+        except RuntimeError as error:
+            raise InputError(f'--visualize: the viewer does not start: {error}') from error
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
                  trace: TracebackType | None) -> None:
-        self.stream.flush()
-        self.stream.disconnect()
+        self.send()
+        if self.broken:
+            # rerun waits for ever for a viewer that takes nothing
+            threading.Thread(target=self.stream.disconnect, daemon=True).start()
+        else:
+            self.stream.disconnect()
+
+    def send(self) -> None:
+        """Send what was logged; to be called often enough that no queue of rerun gets full."""
+        if self.broken:
+            return
+        try:
+            self.stream.flush(timeout_sec=PATIENCE_S)
+        except RuntimeError as error:
+            self.broken = True
+            LOGGER.warning('--visualize: nothing more is shown: %s', error)
 
     def place(self, path: str, T: Array) -> None:
         """Put a frame into the one above it: (4, 4)."""

@@ -107,7 +107,9 @@ class TrackView(Recording):
         self._static()
 
     def show(self, scan: SemanticScan, tracked: TrackedScan) -> None:
-        """Show a scan and what became of it."""
+        """Show a scan and what became of it; nothing once the view is broken."""
+        if self.broken:
+            return
         self.stream.set_time('scan', sequence=self._scans)
         self.stream.set_time('stamp', timestamp=np.datetime64(tracked.stamp_ns, 'ns'))
         self._scans += 1
@@ -121,6 +123,8 @@ class TrackView(Recording):
         self._state(tracked)
         if tracked.T_odom_sensor is not None:
             self._pose(cloud, tracked, tracked.T_odom_sensor)
+        if self.live:
+            self.send()
 
     def _static(self) -> None:
         log = self.stream.log

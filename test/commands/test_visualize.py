@@ -1,5 +1,9 @@
 """`--visualize`: what is written for rerun can be read back, and is what happened."""
 import json
+import os
+import socket
+import subprocess
+import sys
 import tracemalloc
 
 from conftest import relative
@@ -17,6 +21,7 @@ rerun = pytest.importorskip('rerun', reason='the extra visualize is not installe
 RrdReader = pytest.importorskip('rerun.chunk').RrdReader
 
 from sgor_ros.visualize import track_view  # noqa: E402
+from sgor_ros.visualize import viewer_program  # noqa: E402
 from sgor_ros.visualize.clouds import Map  # noqa: E402
 from sgor_ros.visualize.clouds import Shown  # noqa: E402
 from sgor_ros.visualize.recording import SHOWN_INLIERS  # noqa: E402
@@ -203,6 +208,52 @@ def test_what_cannot_be_written_is_refused_before_the_work(street_bag, tmp_path,
         assert command([*paths, '--visualize', str(tmp_path / target)]) == 2
         assert says in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
+
+
+def test_without_a_display_it_is_told_before_the_work(street_bag, tmp_path, monkeypatch, capsys):
+    for name in ('DISPLAY', 'WAYLAND_DISPLAY'):
+        monkeypatch.delenv(name, raising=False)
+    assert replay([str(street_bag), '--output', str(tmp_path / 'out'), '--visualize']) == 2
+    assert 'no display here' in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_viewer_of_the_interpreter_is_found_off_path(monkeypatch):
+    monkeypatch.setenv('PATH', '/nowhere')
+    assert os.access(viewer_program(), os.X_OK)
+
+
+def test_results_are_written_though_the_viewer_dies(street_bag, tmp_path):
+    """A display that is named and not there: the real viewer starts, and ends."""
+    program = [sys.executable, '-m', 'sgor_ros.commands.replay', str(street_bag), '--output',
+               str(tmp_path / 'out'), '--visualize']
+    done = subprocess.run(program, env={**os.environ, 'DISPLAY': ':987'}, capture_output=True,
+                          text=True, timeout=300)
+    if done.returncode == 2:    # a viewer that ends at once is told before the work
+        assert 'the viewer does not start' in done.stderr
+        return
+    assert done.returncode == 0, done.stderr
+    assert 'nothing more is shown' in done.stderr
+    assert json.loads((tmp_path / 'out/summary.json').read_text())['successes'] == 4
+
+
+def test_a_viewer_that_takes_nothing_ends_the_view_and_not_the_work(monkeypatch, caplog):
+    """Its port is open and nobody answers, as of one that was stopped."""
+    monkeypatch.setenv('DISPLAY', ':987')
+    with socket.socket() as deaf:
+        deaf.bind(('127.0.0.1', 0))
+        deaf.listen(8)
+        port = deaf.getsockname()[1]
+        monkeypatch.setattr(rerun, 'spawn', lambda recording, **_: recording.connect_grpc(
+            f'rerun+http://127.0.0.1:{port}/proxy'))
+        monkeypatch.setattr('sgor_ros.visualize.recording.PATIENCE_S', 1.0)
+        scan = SemanticScan(np.random.default_rng(0).uniform(-20, 20, (3000, 3)))
+        with track_view('', SgorConfig()) as look:
+            for index in range(5):
+                look.show(scan, TrackedScan(index, True, '', np.eye(4), None, None, None, None,
+                                            True, False, (), {}))
+    assert look.broken
+    assert caplog.text.count('nothing more is shown') == 1
 
 
 def test_without_rerun_it_says_what_to_install(street_bag, monkeypatch, capsys):

@@ -65,7 +65,7 @@ def test_a_scan_of_another_place_is_not_confirmed(pair, elsewhere):
     other = preprocess(SemanticScan(*elsewhere[0][:2]), CONFIG)
     found = check_prediction(other, target, truth, CONFIG.replace(min_confidence=0.0))
     assert found.status is Status.AMBIGUOUS
-    assert 'ambiguous: 2 placements' in found.reason
+    assert found.reason.startswith('ambiguous: ')
     refused = check_prediction(other, target, truth, CONFIG)
     assert refused.status is Status.REFUSED
     assert 'min_confidence 0.85' in refused.reason

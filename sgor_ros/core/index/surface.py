@@ -17,14 +17,9 @@ NEIGHBOURS, FEWEST = 10, 5
 """Nearest points behind a normal, itself with them; with fewer than so many there is none."""
 NEAR, FAR = 2, 8
 """Edges of a column in which the nearest are looked for first, and at last."""
-WIDTH = 0.4
-"""Least standard deviation of a patch along its second direction, in edges of a column: a normal
-of anything narrower is that of a line, which can lie any way around it."""
 EDGE_ON = 0.05
 """Least cosine between normal and ray. What is seen edge-on is not seen: such a normal is that of
 the fan of one beam, and would hold the beams of one scan to those of another."""
-FLAT = 0.1
-"""A wider patch is flat when its smallest variance is less than this share of the second."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +60,8 @@ def surface(points: NDArray[np.float64], edge: float,
     normals = np.zeros((len(points), 3))
     parallel_for(_normals, len(points), columns.points, columns.first, columns.ny, columns.low,
                  columns.edge, origin, normals)
-    middle = float(np.median(np.sqrt(np.einsum('ij,ij->i', points, points))))
+    rays = points - origin
+    middle = float(np.median(np.sqrt(np.einsum('ij,ij->i', rays, rays))))
     return Surface(columns, normals, middle)
 
 
@@ -118,81 +114,9 @@ def _normals(begin, end, points, first, ny, low, edge, origin, normals):
             syy += b * b
             syz += b * c
             szz += c * c
-        sxx, sxy, sxz = sxx - sx * sx / found, sxy - sx * sy / found, sxz - sx * sz / found
-        syy, syz, szz = syy - sy * sy / found, syz - sy * sz / found, szz - sz * sz / found
-        if _middle(sxx, sxy, sxz, syy, syz, szz) < found * (WIDTH * edge)**2:
-            # one ring of the beams, or a post: a line, whose normal is anyone's guess
-            found, sxx, sxy, sxz, syy, syz, szz = _wider(x, y, z, reach, points, first, nx, ny,
-                                                         low, edge)
-            if found == 0:
-                continue
-        nx_, ny_, nz_ = smallest_direction(sxx, sxy, sxz, syy, syz, szz)
-        dx, dy, dz = x - origin[0], y - origin[1], z - origin[2]
-        facing = abs(nx_ * dx + ny_ * dy + nz_ * dz)
-        if facing >= EDGE_ON * math.sqrt(dx * dx + dy * dy + dz * dz):
-            normals[i] = nx_, ny_, nz_
-
-
-@numba.njit(cache=True, nogil=True)
-def _wider(x, y, z, reach, points, first, nx, ny, low, edge):
-    """Return count and scatter of all points within the least reach that shows a flat patch.
-
-    Without any the count is 0.
-    """
-    reach = max(reach, NEAR * edge)
-    while True:
-        n = 0
-        sx = sy = sz = sxx = sxy = sxz = syy = syz = szz = 0.0
-        x_first, x_last = window(x, reach, low[0], edge, nx)
-        y_first, y_last = window(y, reach, low[1], edge, ny)
-        for column in range(x_first * ny, x_last * ny, ny):
-            for j in range(first[column + y_first], first[column + y_last]):
-                a, b, c = points[j, 0] - x, points[j, 1] - y, points[j, 2] - z
-                if a * a + b * b + c * c > reach * reach:
-                    continue
-                n += 1
-                sx += a
-                sy += b
-                sz += c
-                sxx += a * a
-                sxy += a * b
-                sxz += a * c
-                syy += b * b
-                syz += b * c
-                szz += c * c
-        sxx, sxy, sxz = sxx - sx * sx / n, sxy - sx * sy / n, sxz - sx * sz / n
-        syy, syz, szz = syy - sy * sy / n, syz - sy * sz / n, szz - sz * sz / n
-        middle = _middle(sxx, sxy, sxz, syy, syz, szz)
-        if middle >= n * (WIDTH * edge)**2:
-            if _smallest(sxx, sxy, sxz, syy, syz, szz) > FLAT * middle:
-                n = 0
-            return n, sxx, sxy, sxz, syy, syz, szz
-        if reach >= FAR * edge:
-            return 0, sxx, sxy, sxz, syy, syz, szz
-        reach *= 1.5
-
-
-@numba.njit(cache=True, nogil=True)
-def _spread(xx, xy, xz, yy, yz, zz):
-    """Return mean, spread and angle of the eigenvalues of a symmetric 3 x 3 matrix."""
-    mean = (xx + yy + zz) / 3
-    a, b, c = xx - mean, yy - mean, zz - mean
-    spread = math.sqrt((a * a + b * b + c * c + 2 * (xy * xy + xz * xz + yz * yz)) / 6)
-    if spread < 1e-12:
-        return mean, 0.0, 0.0
-    det = a * (b * c - yz * yz) - xy * (xy * c - yz * xz) + xz * (xy * yz - b * xz)
-    return mean, spread, math.acos(min(max(det / (2 * spread**3), -1.0), 1.0)) / 3
-
-
-@numba.njit(cache=True, nogil=True)
-def _middle(xx, xy, xz, yy, yz, zz):
-    """Return the middle eigenvalue of a symmetric 3 x 3 matrix."""
-    mean, spread, angle = _spread(xx, xy, xz, yy, yz, zz)
-    return mean + 2 * spread * math.cos(angle - 2 * math.pi / 3)
-
-
-@numba.njit(cache=True, nogil=True)
-def _smallest(xx, xy, xz, yy, yz, zz):
-    """Return the smallest eigenvalue of a symmetric 3 x 3 matrix."""
-    mean, spread, angle = _spread(xx, xy, xz, yy, yz, zz)
-    return mean + 2 * spread * math.cos(angle + 2 * math.pi / 3)
+        ux, uy, uz = smallest_direction(
+            sxx - sx * sx / found, sxy - sx * sy / found, sxz - sx * sz / found,
+            syy - sy * sy / found, syz - sy * sz / found, szz - sz * sz / found)
+        a, b, c = x - origin[0], y - origin[1], z - origin[2]
+        if abs(ux * a + uy * b + uz * c) >= EDGE_ON * math.sqrt(a * a + b * b + c * c):
+            normals[i] = ux, uy, uz

@@ -27,7 +27,7 @@ SCALE_OFF = 0.01
 SCALE_SIGMAS = 5.0
 SCALE_ROUNDS = 5
 SCALE_MATCHES = 30
-SCALE_CONFIDENCE = 0.5
+SCALE_CONFIDENCE = 0.05
 """Below, the transformation is probably another anyway."""
 
 

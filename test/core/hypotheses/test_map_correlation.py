@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from sgor_ros.core.common import se3
+from sgor_ros.core.hypotheses.map_correlation import _normal_space_sample
 from sgor_ros.core.hypotheses.map_correlation import _peaks
 from sgor_ros.core.hypotheses.map_correlation import _quarter
 from sgor_ros.core.hypotheses.map_correlation import correlate_maps
@@ -47,13 +48,14 @@ def test_a_shift_and_a_quarter_turn_are_found(quarter, yaw_deg):
     np.testing.assert_allclose(steps, np.round(steps), atol=1e-9)
 
 
-def test_four_peaks_of_each_turn_the_highest_first():
+def test_twelve_peaks_of_the_turn_as_it_is_and_six_of_each_other():
+    """The highest of each first."""
     points, normals = clutter()
     index = index_of(points, normals)
     found = correlate_maps(index, index, moved(0.0), 30.0)
     angles = np.degrees(np.arctan2(found[:, 1, 0], found[:, 0, 0])) % 360
-    np.testing.assert_allclose(angles, np.repeat([0, 90, 180, 270], 4), atol=1e-9)
-    assert len(np.unique(found.round(6), axis=0)) == 16
+    np.testing.assert_allclose(angles, np.repeat([0, 90, 180, 270], (12, 6, 6, 6)), atol=1e-9)
+    assert len(np.unique(found.round(6), axis=0)) == 30
 
 
 def test_the_pose_itself_is_no_other():
@@ -62,7 +64,7 @@ def test_the_pose_itself_is_no_other():
     index = index_of(points, normals)
     found = correlate_maps(index, index, np.eye(4), 30.0)
     straight = found[np.abs(found[:, 0, 0] - 1) < 1e-9]
-    assert len(straight) == 4
+    assert len(straight) == 12
     assert np.abs(straight[:, :2, 3]).max(axis=1).min() > 1.5 * STEP
     # two steps beside the truth it is found, which is the best of all
     found = correlate_maps(index, index, moved(2 * STEP), 30.0)
@@ -77,7 +79,7 @@ def test_shifts_reach_as_far_as_the_radius(radius):
     found = correlate_maps(index, index, start, radius)
     shifts = found[:, :2, 3] - start[:2, 3]
     assert np.abs(shifts).max() <= radius
-    home = np.linalg.norm(found[:4, :2, 3], axis=1).min()
+    home = np.linalg.norm(found[:12, :2, 3], axis=1).min()
     assert bool(home < 0.01) is (radius > 8.4)
 
 
@@ -90,8 +92,8 @@ def test_the_plane_of_the_ground_is_that_of_the_target():
     start = roll @ moved(2 * STEP, 4 * STEP) @ se3.inverse(roll)
     found = correlate_maps(lying, lying, start, 30.0)
     np.testing.assert_allclose(found @ np.array([0, 0, 0, 1.0]) @ [*up, 0], 0, atol=1e-9)
-    assert np.abs(found[:4] - np.eye(4)).max(axis=(1, 2)).min() < 1e-9
-    np.testing.assert_allclose([T[:3, :3] @ up for T in found], np.tile(up, (16, 1)), atol=1e-9)
+    assert np.abs(found[:12] - np.eye(4)).max(axis=(1, 2)).min() < 1e-9
+    np.testing.assert_allclose([T[:3, :3] @ up for T in found], np.tile(up, (30, 1)), atol=1e-9)
 
 
 def test_labels_tell_things_apart():
@@ -133,7 +135,21 @@ def test_peaks_are_the_highest_and_none_is_next_to_another():
     hits[0, 0, 0], hits[0, 1, 1], hits[0, 2, 2], hits[0, 5, 4], hits[0, 4, 3] = 9, 8, 7, 6, 5
     hits[0, 0, 4], hits[0, 5, 0] = 4, 3
     hits[1, 3, 2] = 1
-    assert _peaks(hits.copy(), 3) == [(0, 0, 0), (0, 2, 2), (0, 5, 4), (1, 3, 2)]
-    assert _peaks(hits.copy(), 9) == [(0, 0, 0), (0, 2, 2), (0, 5, 4), (0, 0, 4), (0, 5, 0),
+    assert _peaks(hits.copy(), (3, 3)) == [(0, 0, 0), (0, 2, 2), (0, 5, 4), (1, 3, 2)]
+    assert _peaks(hits.copy(), (9, 9)) == [(0, 0, 0), (0, 2, 2), (0, 5, 4), (0, 0, 4), (0, 5, 0),
                                       (1, 3, 2)]
-    assert _peaks(np.zeros((4, 3, 3), np.int32), 4) == []
+    assert _peaks(hits.copy(), (2, 0)) == [(0, 0, 0), (0, 2, 2)]
+    assert _peaks(np.zeros((4, 3, 3), np.int32), (4, 4, 4, 4)) == []
+
+
+def test_normal_space_sampling_by_hand():
+    """10 of 3, 7 and 90: all of the few, what they leave is for the others; in order."""
+    sectors = np.repeat([5, 0, 2], [90, 3, 7])
+    for most, counts in ((10, (3, 4, 3)), (30, (3, 7, 20)), (2, (0, 1, 1)), (200, (3, 7, 90))):
+        rows = _normal_space_sample(sectors, most)
+        assert (np.diff(rows) > 0).all()
+        found = tuple(int((sectors[rows] == sector).sum()) for sector in (0, 2, 5))
+        assert sum(found) == min(most, 100)
+        if most > 2:
+            assert found == counts
+    assert _normal_space_sample(sectors[:0], 10).shape == (0,)

@@ -27,8 +27,11 @@ def motion(x, y, z, yaw_deg, pitch_deg=0.0):
     return T
 
 
-def aligned(source, target, start):
-    return align(surface(source, 0.5), surface(target, 0.5), start, SgorConfig())
+def aligned(source, target, start, origins=((0, 0, 0), (0, 0, 0))):
+    """Return the alignment of clouds that were seen from these places."""
+    return align(*(surface(points, 0.5, np.array(origin, np.float64))
+                   for points, origin in zip((source, target), origins, strict=True)),
+                 start, SgorConfig())
 
 
 def noise(found):
@@ -67,7 +70,8 @@ def test_covariance_turns_with_the_target_frame(clouds, move):
     """The same problem seen from a moved target: each 3x3 block turns, nothing else happens."""
     source, target, truth = clouds
     plain = aligned(source, target, truth)
-    moved = aligned(source, target @ move[:3, :3].T + move[:3, 3], move @ truth)
+    moved = aligned(source, target @ move[:3, :3].T + move[:3, 3], move @ truth,
+                    ((0, 0, 0), move[:3, 3]))
     np.testing.assert_allclose(moved.T_target_source, move @ plain.T_target_source, atol=2e-3)
     turn = np.kron(np.eye(2), move[:3, :3])
     expected = turn @ noise(plain) @ turn.T
@@ -80,7 +84,8 @@ def test_covariance_is_of_the_source_frame_in_the_target(clouds):
     source, target, truth = clouds
     plain = aligned(source, target, truth)
     shift = motion(-20, 8, 2, 0)
-    moved = aligned(source @ shift[:3, :3].T + shift[:3, 3], target, truth @ np.linalg.inv(shift))
+    moved = aligned(source @ shift[:3, :3].T + shift[:3, 3], target, truth @ np.linalg.inv(shift),
+                    (shift[:3, 3], (0, 0, 0)))
     x, y, z = truth[:3, :3] @ np.linalg.inv(shift)[:3, 3]
     carry = np.eye(6)
     carry[:3, 3:] = -np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])

@@ -48,12 +48,24 @@ def test_violations_count_where_the_other_agrees():
 
 @pytest.mark.parametrize(('against', 'back', 'n', 'out'), [
     (0, 0, 1000, False), (4, 0, 1000, False), (5, 0, 1000, True),   # by a count of five,
-    (5, 1, 1000, False), (6, 1, 1000, True),                        # less those of the answer,
-    (8, 3, 1000, False), (9, 3, 1000, True),                        # three times as many,
+    # less those of the answer and half as many for noise: 5 + 1.5, 5 + 4.5; three times as many
+    (6, 1, 1000, False), (7, 1, 1000, True), (9, 3, 1000, False), (10, 3, 1000, True),
+    (11, 4, 1000, False), (12, 4, 1000, True),
     (11, 0, 4000, False), (12, 0, 4000, True),                      # of 4,000 by 0.3 %
     (0, 50, 1000, False)])
 def test_free_space_rules_out_what_alone_violates(against, back, n, out):
     answer, other = pair(against, back, n=n)
+    assert ruled_out(answer, other[None]).tolist() == [out]
+
+
+@pytest.mark.parametrize(('own', 'others', 'out'), [
+    (0, 12, False), (0, 13, True), (10, 42, False), (10, 43, True), (100, 312, False),
+    (100, 313, True)])
+def test_far_too_many_violations_rule_out_wherever_they_are(own, others, out):
+    """Where the answer observes nothing: 1.25 % of 1,000 beyond three times those of its own."""
+    answer = outcomes((own, -1), (100, 1), n=1000)
+    other = outcomes((own, -1), (100, 1), (others - own, -1), n=1000)
+    assert exclusive_violations(answer, other[None])[0].tolist() == [0]
     assert ruled_out(answer, other[None]).tolist() == [out]
 
 
@@ -103,6 +115,15 @@ def test_nobody_beats_the_first_without_a_clear_lead():
     (0, 11, 4000, 0), (0, 12, 4000, 1)])
 def test_a_pose_that_the_answer_violates_alone_wins(against, back, n, best):
     answer, other = pair(against, back, n=n)
+    assert best_supported(np.array([answer, other])) == best
+
+
+@pytest.mark.parametrize(('agree', 'violates', 'best'), [
+    (44, 0, 1), (45, 0, 0), (0, 0, 1), (44, 12, 1), (44, 13, 0)])
+def test_a_pose_with_so_much_more_support_wins(agree, violates, best):
+    """100 agree, of which 45 % have to; not where too many violations rule it out."""
+    answer = outcomes((agree, 1), n=1000)
+    other = outcomes((100, 1), (violates, -1), n=1000)
     assert best_supported(np.array([answer, other])) == best
 
 

@@ -35,7 +35,7 @@ CONFIG = SgorConfig(tau_1=0.5)
 COVARIANCE = np.diag([1e-4] * 3 + [1e-6] * 3)
 REPEATED = np.diag([1e-3] * 3 + [1e-4] * 3)
 SLIDE = DegenerateDirection(np.array([1.0, 0, 0, 0, 0, 0]), 10.0, 20.0)
-CONFIDENCE = 1 / 1.01    # all keypoints agree
+CONFIDENCE = 1 / (1 + np.exp(8.34 + 3.34 * np.log(0.005)))
 TIMINGS = {'alignment': 0.1}
 
 
@@ -144,10 +144,10 @@ def test_inliers_are_nearer_than_tau_1(pair):
 
 def test_refused_below_min_confidence_whatever_competes_or_slides(pair):
     """No alternatives, no directions, no widened covariance for what is not believed."""
-    config = CONFIG.replace(min_confidence=0.995)
+    config = CONFIG.replace(min_confidence=1.0)
     result = decide(pair, verified(pair, moved(8), degenerate=(SLIDE,)), aligned(), config)
     assert result.status is Status.REFUSED
-    assert result.reason == ('confidence 0.99 is below min_confidence 0.99: of the keypoints '
+    assert result.reason == ('confidence 1.00 is below min_confidence 1.00: of the keypoints '
                              '100% agree, 0.0% contradict')
     assert result.T_target_source is not None
     assert result.confidence == CONFIDENCE
@@ -287,7 +287,8 @@ def test_refuse_keeps_the_tested_pose(pair):
     assert result.T_target_source is test.T_target_source
     assert result.inliers.tolist() == [True, True, False, False]
     assert result.score == PoseScore(0.6, 0.2)
-    assert result.confidence == pytest.approx(0.6 / (0.6 + 5 * 0.2 + 0.01))
+    assert result.confidence == pytest.approx(
+        1 / (1 + np.exp(8.34 - 2.85 * np.log(0.6) + 3.34 * np.log(0.205))))
     assert result.covariance is result.correlated_error is None
     assert_alone(result)
     assert_of_the_pair(result, pair)
@@ -322,7 +323,7 @@ def test_labels_that_one_scan_lacks_are_ignored_with_a_warning(prepared, source,
 
 def test_low_confidence_in_words():
     assert low_confidence(PoseScore(0.254, 0.0316), SgorConfig(min_confidence=0.9)) == (
-        'confidence 0.60 is below min_confidence 0.90: of the keypoints 25% agree, 3.2% '
+        'confidence 0.23 is below min_confidence 0.90: of the keypoints 25% agree, 3.2% '
         'contradict')
 
 
