@@ -38,7 +38,7 @@ CORE = ('common', 'execution', 'ablation', 'config', 'scan', 'features', 'index'
 
 # likewise in evaluation
 EVALUATION = ('dense_reference', 'output', 'metrics', 'methods', 'protocols', 'front_end', 'job',
-              'memory', 'sequences', 'loops', 'solver', 'runner', 'report')
+              'memory', 'sequences', 'loops', 'solver', 'calibration', 'runner', 'report')
 
 
 def imports_of(path):

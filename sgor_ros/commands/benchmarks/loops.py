@@ -19,6 +19,7 @@ from ..scene_pairs import scene_kinds
 from . import inputs
 from .numbers import positive
 
+STREET = 'street'
 HELP = 'loop closure: how many are found, how many are wrong, and what they are worth'
 
 
@@ -33,7 +34,8 @@ def add_options(command: ArgumentParser) -> None:
     command.add_argument('--seeds', type=positive, default=1, help='places of each kind there')
     command.add_argument('--way', type=float, default=400.0, metavar='M', help='there, before it '
                          'turns round and comes back')
-    inputs.add_kinds(command)
+    command.add_argument('--kinds', nargs='+', metavar='KIND', default=[STREET],
+                         help='of places there; default: the street, which is no other kind')
 
 
 def measure(arguments: Namespace, folder: Path) -> None:
@@ -50,8 +52,8 @@ def measure(arguments: Namespace, folder: Path) -> None:
     if inputs.wants_world(arguments):
         from ...world import Lidar
         lidar = Lidar(beams=arguments.beams, label_noise=arguments.random_labels)
-        kinds = list(scene_kinds(arguments.kinds)) if arguments.kinds else ['street']
-        for kind in kinds:
+        scene_kinds([kind for kind in arguments.kinds if kind != STREET])
+        for kind in arguments.kinds:
             for seed in range(arguments.seed, arguments.seed + arguments.seeds):
                 inputs.say(f'{kind}, seed {seed}: scanning')
                 drive = return_drive(kind, arguments.way, seed, lidar)
