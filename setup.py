@@ -21,7 +21,7 @@ COMMANDS_NEED = [
 ]
 # and APE and RPE, the other methods, their matches from depth maps, and a cluster to run on
 EVALUATION = [*COMMANDS_NEED, *OPEN3D, 'evo', 'kiss-icp', 'kiss_matcher', 'small_gicp>=1.0',
-              'igraph', 'pillow', 'distributed']
+              'igraph', 'pillow', 'distributed', 'scikit-learn']
 
 setup(
     name='sgor_ros',

@@ -37,8 +37,8 @@ CORE = ('common', 'execution', 'ablation', 'config', 'scan', 'features', 'index'
         'compact_scan', 'verdict', 'registration', 'prediction_check', 'warmup')
 
 # likewise in evaluation
-EVALUATION = ('dense_reference', 'output', 'metrics', 'methods', 'protocols', 'front_end', 'job',
-              'memory', 'sequences', 'loops', 'solver', 'calibration', 'runner', 'report')
+EVALUATION = ('dense_reference', 'output', 'calibration', 'metrics', 'methods', 'protocols',
+              'front_end', 'job', 'memory', 'sequences', 'loops', 'solver', 'runner', 'report')
 
 
 def imports_of(path):

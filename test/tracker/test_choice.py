@@ -211,7 +211,7 @@ def test_through_a_tunnel_the_covariance_says_what_is_not_known(monkeypatch, mod
     prepared = preprocess(scan)
     number = {}
 
-    def prepare(_, config, scale_before=None):
+    def prepare(_, config, scale_before=None, up_before=None):
         copy = type(prepared)(**{**vars(prepared), 'config': config})
         number[id(copy)] = len(number)
         kept.append(copy)

@@ -273,7 +273,7 @@ def test_a_pose_that_scores_too_low_gets_more_rounds():
     assert 0.9 < confidence < 1
     enough = compete(source, target, np.eye(4), NOTHING, SgorConfig(min_confidence=confidence))
     np.testing.assert_array_equal(enough.T_target_source, plain.T_target_source)
-    more = compete(source, target, np.eye(4), NOTHING, SgorConfig(min_confidence=0.999))
+    more = compete(source, target, np.eye(4), NOTHING, SgorConfig(min_confidence=1.0))
     T = icp(source, target, plain.T_target_source[None], 10, 10)
     assert not np.array_equal(T[0], plain.T_target_source)
     np.testing.assert_array_equal(more.T_target_source, T[0])
