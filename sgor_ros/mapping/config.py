@@ -13,7 +13,7 @@ class MapperAblation(Settings):
     FOR_STUDIES: ClassVar[bool] = True
 
     near_candidates: int = setting(
-        3, 'Keyframes near by to try for each new one', minimum=0, maximum=100)
+        4, 'Keyframes near by to try for each new one', minimum=0, maximum=100)
     alike_candidates: int = setting(
         3, 'Keyframes that look alike to try for each new one, wherever they are', minimum=0,
         maximum=100)
