@@ -101,8 +101,8 @@ class Ablation(Settings):
     refinement_rounds: int = setting(
         3, 'Times that the refinement fits; the paper: once', minimum=1, maximum=100)
     min_inliers: int = setting(
-        10, 'Fewer inliers, or inliers on a line, are a failure; 0: neither is asked (beyond the '
-        'paper)', minimum=0, maximum=10000)
+        10, 'Fewer inliers, or inliers on a line, are a failure; where clouds decide too, the '
+        'default asks for 5; 0: neither is asked (beyond the paper)', minimum=0, maximum=10000)
 
     # on the clouds (beyond the paper)
     local_refinement: bool = setting(

@@ -132,9 +132,8 @@ class SgorConfig(Ablation):
 PREPARATION = (
     'label_convention', 'min_range', 'max_range', 'drop_isolated', 'voxel_size', 'max_voxels',
     'sigma_g', 'secondary_ground', 'labelled_ground', 'robust_ground', 'ground_radius',
-    'min_ground_points',
-    'correspondence_preprocessing', 'drop_ground_labels', 'normal_radius', 'descriptor_radius',
-    'vote_radius', 'context_weight', 'context_scale', 'moving_vote',
+    'min_ground_points', 'correspondence_preprocessing', 'drop_ground_labels', 'normal_radius',
+    'descriptor_radius', 'vote_radius', 'context_weight', 'context_scale', 'moving_vote',
     'max_correspondence_distance')
 """What a scan is prepared with, besides the scale: registrations that differ in it cannot share
 one."""

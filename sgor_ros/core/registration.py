@@ -156,8 +156,8 @@ def _attempts(config: SgorConfig, *, labelled: bool, level: bool) -> Iterator[Sg
     there are none, without what stands around, which from afar looks another. Where the ground
     planes may be of walls or tables, nothing stands around, and whatever is level is tried too.
     """
-    # of those that are few, too, the clouds decide
-    config = config.replace(min_inliers=min(config.min_inliers, FEWEST_INLIERS))
+    if config.min_inliers == SgorConfig.min_inliers:    # nobody asked for more
+        config = config.replace(min_inliers=FEWEST_INLIERS)
     if not labelled:
         config = config.replace(semantics='none')
         less = config.replace(context_weight=0.0)

@@ -7,11 +7,12 @@ from numpy.typing import NDArray
 
 from ..core.common.settings import InputError
 from ..core.scoring.calibration import FEWEST_VIOLATIONS
+from .metrics.reliability import binned
 
 Array = NDArray[np.float64]
 
-BINS = 10
-"""Of the expected calibration error, of equal width."""
+BINS = tuple(k / 10 for k in range(11))
+"""Of the expected calibration error."""
 SURE = 0.99
 """Claims from here on are counted by themselves."""
 
@@ -122,10 +123,9 @@ def left_out(samples: Sequence[Sample], group: str) -> Array:
 
 def quality(claimed: Array, right: NDArray[np.bool_]) -> Quality:
     """Compare (N,) probabilities with what came of them."""
-    bins = np.minimum((claimed * BINS).astype(int), BINS - 1)
-    error = sum(abs(claimed[bins == k].mean() - right[bins == k].mean()) * (bins == k).mean()
-                for k in np.unique(bins))
+    error = sum(abs(each.answers * each.mean - each.right)
+                for each in binned(claimed, right, BINS)) / max(len(claimed), 1)
     sure = claimed >= SURE
-    return Quality(len(claimed), int(right.sum()), float(error),
+    return Quality(len(claimed), int(right.sum()), error,
                    float(np.mean((claimed - right)**2)) if len(claimed) else 0.0,
                    int(sure.sum()), int((sure & ~right).sum()))

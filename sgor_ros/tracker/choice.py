@@ -7,13 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.config import SgorConfig
+from ..core.icp.covariance import square_root
 from ..core.icp.gicp import align
 from ..core.prepared_scan import PreparedScan
 from ..core.verdict.result import Placement
 from ..core.verdict.result import Registration
 from ..core.verdict.result import Status
 from .config import TrackerConfig
-from .covariance import square_root
 from .motion import GATE
 from .motion import Motion
 

@@ -60,9 +60,3 @@ class PoseCovariance:
         cross = shared @ root.T
         pose = carry @ self.pose @ carry.T + turn @ step @ turn.T + cross + cross.T
         return type(self)((pose + pose.T) / 2, shared + root)
-
-
-def square_root(covariance: Array) -> Array:
-    """Return the symmetric square root of a (6, 6) covariance."""
-    values, vectors = np.linalg.eigh(covariance)
-    return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)) @ vectors.T)

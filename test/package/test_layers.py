@@ -37,7 +37,7 @@ CORE = ('common', 'execution', 'ablation', 'config', 'scan', 'features', 'index'
         'compact_scan', 'verdict', 'registration', 'prediction_check', 'warmup')
 
 # likewise in evaluation
-EVALUATION = ('dense_reference', 'output', 'calibration', 'metrics', 'methods', 'protocols',
+EVALUATION = ('dense_reference', 'output', 'metrics', 'calibration', 'methods', 'protocols',
               'front_end', 'job', 'memory', 'sequences', 'loops', 'solver', 'runner', 'report')
 
 

@@ -11,6 +11,7 @@ from sgor_ros import SemanticScan
 from sgor_ros import SgorConfig
 from sgor_ros import TrackerConfig
 from sgor_ros.core.execution.lazy import Lazy
+from sgor_ros.core.icp.covariance import square_root
 from sgor_ros.core.icp.gicp import align
 from sgor_ros.core.verdict.result import Placement
 from sgor_ros.core.verdict.result import Status
@@ -20,7 +21,6 @@ from sgor_ros.tracker.choice import choose
 from sgor_ros.tracker.choice import is_likely
 from sgor_ros.tracker.choice import refined
 from sgor_ros.tracker.choice import Step
-from sgor_ros.tracker.covariance import square_root
 from sgor_ros.tracker.motion import Motion
 
 PERIOD_NS = 100_000_000

@@ -7,12 +7,12 @@ from sgor_ros import SemanticScan
 from sgor_ros import Tracker
 from sgor_ros import TrackerConfig
 from sgor_ros.core.common import se3
+from sgor_ros.core.icp.covariance import square_root
 from sgor_ros.evaluation.metrics.consistency import track_consistency
 from sgor_ros.evaluation.metrics.pose_error import nees
 from sgor_ros.evaluation.metrics.pose_error import NEES_BOUND
 from sgor_ros.tracker.covariance import CORRELATION_LENGTHS_M
 from sgor_ros.tracker.covariance import PoseCovariance
-from sgor_ros.tracker.covariance import square_root
 from sgor_ros.world import Lidar
 from sgor_ros.world import simulate
 

@@ -1,5 +1,6 @@
 """Scenes of boxes at known places, and sensors that see them without noise."""
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
@@ -39,16 +40,19 @@ def angles(points):
     return np.rad2deg(np.arctan2(y, x)), np.rad2deg(np.arctan2(z, np.hypot(x, y)))
 
 
+@cache
 def room():
     """Return the inside of a cube of 20 m."""
     return scene(b50=((-10, 10), (-10, 10), (-10, 10)))
 
 
+@cache
 def floor():
     """Return level ground at z = 0."""
     return scene(r40=((-FAR, FAR), (-FAR, FAR), (-1, 0)))
 
 
+@cache
 def walls():
     """Return two walls that face each other, at x = 10 and at x = -20."""
     return scene(b50=((10, 11), (-FAR, FAR), (-FAR, FAR)),

@@ -28,21 +28,6 @@ from sgor_ros.world.traffic import truck_beside
 TWIST = np.array([15.0, -1.0, 0.5, 0.1, -0.2, 0.8])    # m/s, rad/s
 
 
-@pytest.fixture(scope='module', name='room')
-def room_():
-    return boxes.room()
-
-
-@pytest.fixture(scope='module', name='floor')
-def floor_():
-    return boxes.floor()
-
-
-@pytest.fixture(scope='module', name='walls')
-def walls_():
-    return boxes.walls()
-
-
 def test_the_default_scan_is_what_it_was_before_there_were_sensors():
     """Point by point, bit by bit, as the first version drew and cast them."""
     yard, lidar = scenes.make('courtyard', 0), Lidar(columns=450, label_noise=0.1)
@@ -70,10 +55,10 @@ def test_the_default_scan_is_what_it_was_before_there_were_sensors():
 
 
 @pytest.mark.parametrize('share', [0.01, 0.1, 0.4])
-def test_rain_returns_early_anywhere_on_the_way(room, share):
+def test_rain_returns_early_anywhere_on_the_way(share):
     sensor = replace(CLEAN, columns=1800)
-    dry, _ = sensor.scan(room, np.eye(4), rng())
-    wet, labels = replace(sensor, early_returns=share).scan(room, np.eye(4), rng())
+    dry, _ = sensor.scan(boxes.room(), np.eye(4), rng())
+    wet, labels = replace(sensor, early_returns=share).scan(boxes.room(), np.eye(4), rng())
     reach, truth = np.linalg.norm(wet, axis=1), np.linalg.norm(dry, axis=1)
     early = labels == 0
     assert early.mean() == pytest.approx(share, rel=0.1)
@@ -83,19 +68,19 @@ def test_rain_returns_early_anywhere_on_the_way(room, share):
                                [0.0, 0.25, 0.5, 0.75, 1.0], atol=0.08)
 
 
-def test_rain_is_seen_against_the_sky(floor):
+def test_rain_is_seen_against_the_sky():
     sensor = replace(CLEAN, max_range=50.0, early_returns=0.2)
-    points, labels = sensor.scan(floor, at(z=2.0), rng())
+    points, labels = sensor.scan(boxes.floor(), at(z=2.0), rng())
     up = points[:, 2] > 0
     assert (labels[up] == 0).all()
     assert up.sum() == pytest.approx(0.2 * 8 * 720, rel=0.1)
     assert 1.0 <= np.linalg.norm(points, axis=1)[up].min()
 
 
-def test_ghosts_are_the_mirror_image_behind_the_mirror(walls):
+def test_ghosts_are_the_mirror_image_behind_the_mirror():
     """Seen in the wall at x = 10, the one at x = -20 stands at x = 40; and the other way round."""
-    truth, _ = CLEAN.scan(walls, np.eye(4), rng())
-    points, labels = replace(CLEAN, ghosts=0.2).scan(walls, np.eye(4), rng())
+    truth, _ = CLEAN.scan(boxes.walls(), np.eye(4), rng())
+    points, labels = replace(CLEAN, ghosts=0.2).scan(boxes.walls(), np.eye(4), rng())
     x = points[:, 0]
     front, back = x > 0, x < 0
     behind = np.where(front, x > 11.0, x < -21.0)
@@ -108,9 +93,9 @@ def test_ghosts_are_the_mirror_image_behind_the_mirror(walls):
     assert len(points) <= len(truth)
 
 
-def test_a_mirror_of_nothing_returns_nothing(floor):
-    dry, _ = CLEAN.scan(floor, at(z=2.0), rng())
-    wet, _ = replace(CLEAN, ghosts=0.3).scan(floor, at(z=2.0), rng())
+def test_a_mirror_of_nothing_returns_nothing():
+    dry, _ = CLEAN.scan(boxes.floor(), at(z=2.0), rng())
+    wet, _ = replace(CLEAN, ghosts=0.3).scan(boxes.floor(), at(z=2.0), rng())
     assert len(wet) / len(dry) == pytest.approx(0.7, abs=0.03)
     np.testing.assert_allclose(wet[:, 2], -2.0, rtol=1e-4)
 
@@ -129,8 +114,9 @@ def test_the_sensor_moves_along_the_exponential_of_its_twist(twist):
         np.testing.assert_allclose(t[k], T[:3, 3], atol=1e-12)
 
 
-def test_a_wall_seen_at_20_metres_a_second_bends_by_speed_times_time(walls):
-    points, labels, times = CLEAN.sweep(walls, np.eye(4), rng(), [20.0, 0, 0, 0, 0, 0], 0.1)
+def test_a_wall_seen_at_20_metres_a_second_bends_by_speed_times_time():
+    points, labels, times = CLEAN.sweep(boxes.walls(), np.eye(4), rng(), [20.0, 0, 0, 0, 0, 0],
+                                        0.1)
     ahead = labels == BUILDING
     near = np.linalg.norm(points, axis=1) < 50.0    # float32 over there
     np.testing.assert_allclose(points[ahead & near, 0], 10.0 - 20.0 * times[ahead & near],
@@ -140,14 +126,14 @@ def test_a_wall_seen_at_20_metres_a_second_bends_by_speed_times_time(walls):
     assert times.max() == pytest.approx(0.1 * 719 / 720)
 
 
-def test_a_sweep_goes_round_with_the_time(room):
-    points, _, times = CLEAN.sweep(room, np.eye(4), rng(), np.zeros(6), 0.1)
+def test_a_sweep_goes_round_with_the_time():
+    points, _, times = CLEAN.sweep(boxes.room(), np.eye(4), rng(), np.zeros(6), 0.1)
     azimuth, _ = angles(points)
     turned = -azimuth % 360.0
     np.testing.assert_allclose(turned - 3600.0 * times, (turned - 3600.0 * times)[0], atol=0.01)
     # a sector takes as long, from the left to the right
     points, _, times = replace(CLEAN, fov_horizontal=np.pi / 2).sweep(
-        room, np.eye(4), rng(), np.zeros(6), 0.1)
+        boxes.room(), np.eye(4), rng(), np.zeros(6), 0.1)
     azimuth, _ = angles(points)
     np.testing.assert_allclose(azimuth, 45.0 - 900.0 * times, atol=0.51)
 
@@ -169,23 +155,23 @@ def test_a_bent_scan_unbent_lies_on_what_a_standing_sensor_sees(name):
     assert np.quantile(away(points), 0.9) > 0.05
 
 
-def test_a_sweep_that_stands_still_is_a_scan(walls):
+def test_a_sweep_that_stands_still_is_a_scan():
     sensor = Lidar(early_returns=0.1, ghosts=0.1, columns=360)
-    points, labels = sensor.scan(walls, at(1.0, 2.0, 3.0), rng(4))
-    again, same, _ = sensor.sweep(walls, at(1.0, 2.0, 3.0), rng(4), np.zeros(6))
+    points, labels = sensor.scan(boxes.walls(), at(1.0, 2.0, 3.0), rng(4))
+    again, same, _ = sensor.sweep(boxes.walls(), at(1.0, 2.0, 3.0), rng(4), np.zeros(6))
     np.testing.assert_allclose(again, points, atol=1e-5)
     np.testing.assert_array_equal(same, labels)
 
 
 @pytest.mark.parametrize('moving', [False, True])
-def test_what_moves_with_the_sensor_is_at_the_same_place_in_each_scan(floor, moving):
+def test_what_moves_with_the_sensor_is_at_the_same_place_in_each_scan(moving):
     sensor = replace(CLEAN, fov_up=0.4, fov_down=-0.6)
     for pose in (at(z=1.73), at(50.0, -3.0, 1.73)):
         if moving:
-            points, labels, _ = sensor.sweep(floor, pose, rng(), TWIST / 10,
+            points, labels, _ = sensor.sweep(boxes.floor(), pose, rng(), TWIST / 10,
                                              companions=truck_beside())
         else:
-            points, labels = sensor.scan(floor, pose, rng(), truck_beside())
+            points, labels = sensor.scan(boxes.floor(), pose, rng(), truck_beside())
         truck = points[labels == TRUCK]
         assert len(truck) > 1000
         # its near side, 3.5 m away and 2.5 m wide, hides what is behind
@@ -197,8 +183,8 @@ def test_what_moves_with_the_sensor_is_at_the_same_place_in_each_scan(floor, mov
                     & (road[:, 1] < 12.0)).any()
 
 
-def test_a_convoy_is_six_cars_around(floor):
-    points, labels = CLEAN.scan(floor, at(z=1.73), rng(), convoy())
+def test_a_convoy_is_six_cars_around():
+    points, labels = CLEAN.scan(boxes.floor(), at(z=1.73), rng(), convoy())
     cars = points[labels == CAR]
     lanes = {(int(np.sign(x)), round(float(y) / 3.5)) for x, y, _ in cars}
     assert lanes == {(side, lane) for side in (-1, 1) for lane in (-1, 0, 1)}

@@ -19,18 +19,8 @@ from sgor_ros.world.sensors import SENSORS
 SPINNING = [name for name, sensor in SENSORS.items() if type(sensor) is Lidar]
 
 
-@pytest.fixture(scope='module', name='room')
-def room_():
-    return boxes.room()
-
-
-@pytest.fixture(scope='module', name='floor')
-def floor_():
-    return boxes.floor()
-
-
-def test_each_beam_of_a_vlp_16_meets_level_ground_at_its_range(floor):
-    points, labels = clean(SENSORS['VLP-16']).scan(floor, at(z=2.0), rng())
+def test_each_beam_of_a_vlp_16_meets_level_ground_at_its_range():
+    points, labels = clean(SENSORS['VLP-16']).scan(boxes.floor(), at(z=2.0), rng())
     assert set(labels) == {ROAD}
     reach = np.linalg.norm(points.astype(float), axis=1).reshape(8, 1800)
     down = np.deg2rad(np.arange(1, 16, 2))
@@ -44,14 +34,14 @@ def test_each_beam_of_a_vlp_16_meets_level_ground_at_its_range(floor):
                  -6.66, -8.0, -9.33, -10.67, -12.0, -13.33, -14.67, -16.0, -17.33, -18.67, -20.0,
                  -21.33, -22.67, -24.0, -25.33, -26.66, -28.0, -29.33, -30.67]),
     ('Pandar XT-32', np.arange(15.0, -17.0, -1.0))])
-def test_beams_are_where_the_manual_says(room, name, degrees):
-    points, _ = clean(SENSORS[name]).scan(room, np.eye(4), rng())
+def test_beams_are_where_the_manual_says(name, degrees):
+    points, _ = clean(SENSORS[name]).scan(boxes.room(), np.eye(4), rng())
     _, elevation = angles(points.reshape(len(degrees), -1, 3)[:, 0])
     np.testing.assert_allclose(elevation, degrees, atol=0.01)
 
 
-def test_beams_of_a_pandar64_are_dense_at_the_horizon_and_sparse_below(room):
-    points, _ = clean(SENSORS['Pandar64']).scan(room, np.eye(4), rng())
+def test_beams_of_a_pandar64_are_dense_at_the_horizon_and_sparse_below():
+    points, _ = clean(SENSORS['Pandar64']).scan(boxes.room(), np.eye(4), rng())
     _, elevation = angles(points.reshape(64, 1800, 3)[:, 0])
     gap = -np.diff(elevation)
     np.testing.assert_allclose(gap[(elevation[1:] < 2) & (elevation[1:] > -6)], 1 / 6, atol=0.01)
@@ -60,9 +50,9 @@ def test_beams_of_a_pandar64_are_dense_at_the_horizon_and_sparse_below(room):
 
 
 @pytest.mark.parametrize('name', SENSORS)
-def test_a_sensor_fills_its_field_of_view_and_no_more(room, name):
+def test_a_sensor_fills_its_field_of_view_and_no_more(name):
     sensor = clean(SENSORS[name])
-    points, _ = sensor.scan(room, np.eye(4), rng())
+    points, _ = sensor.scan(boxes.room(), np.eye(4), rng())
     azimuth, elevation = angles(points)
     assert np.rad2deg(sensor.fov_down) - 1e-3 <= elevation.min()
     assert elevation.max() <= np.rad2deg(sensor.fov_up) + 1e-3
@@ -92,26 +82,26 @@ def test_ranges_end_where_the_sheet_says(name):
 
 
 @pytest.mark.parametrize('name', SENSORS)
-def test_noise_is_that_of_the_sheet_and_the_seed_decides(room, name):
+def test_noise_is_that_of_the_sheet_and_the_seed_decides(name):
     sensor = replace(SENSORS[name], drop_out=0.0, min_range=0.0)
-    points, _ = sensor.scan(room, np.eye(4), rng(3))
-    np.testing.assert_array_equal(points, sensor.scan(room, np.eye(4), rng(3))[0])
-    truth, _ = replace(sensor, range_noise=0.0).scan(room, np.eye(4), rng(3))
+    points, _ = sensor.scan(boxes.room(), np.eye(4), rng(3))
+    np.testing.assert_array_equal(points, sensor.scan(boxes.room(), np.eye(4), rng(3))[0])
+    truth, _ = replace(sensor, range_noise=0.0).scan(boxes.room(), np.eye(4), rng(3))
     error = np.linalg.norm(points, axis=1) - np.linalg.norm(truth, axis=1)
     assert error.std() == pytest.approx(sensor.range_noise, rel=0.05)
 
 
 @pytest.mark.parametrize('name', ['Avia', 'Mid-360'])
-def test_a_livox_looks_elsewhere_in_each_scan(room, name):
+def test_a_livox_looks_elsewhere_in_each_scan(name):
     """Ten scans fill gaps that one leaves; ten turns of a spinning one hit the same rings."""
     source, sensor = rng(), clean(SENSORS[name])
-    scans = [sensor.scan(room, np.eye(4), source)[0] for _ in range(10)]
+    scans = [sensor.scan(boxes.room(), np.eye(4), source)[0] for _ in range(10)]
     units = [p / np.linalg.norm(p, axis=1, keepdims=True) for p in scans]
     places = np.concatenate(units)[rng(1).integers(10 * len(units[0]), size=2000)]
     one = np.quantile(cKDTree(units[0]).query(places)[0], 0.9)
     ten = np.quantile(cKDTree(np.concatenate(units[1:])).query(
         units[0][::10])[0], 0.9)
     assert ten < 0.6 * one
-    *_, times = sensor.sweep(room, np.eye(4), source, np.zeros(6))
+    *_, times = sensor.sweep(boxes.room(), np.eye(4), source, np.zeros(6))
     assert (np.diff(times.reshape(sensor.beams, -1), axis=1) > 0).all()
     assert times.max() < 0.1

@@ -53,9 +53,9 @@ def measure(arguments: Namespace, folder: Path) -> None:
             inputs.say(f'{number} registrations, {sum(s.right for s in samples)} right')
     model = fit(samples)
     right = np.array([s.right for s in samples])
+    claims = {group: left_out(samples, group) for group in ('sensor', 'place')}
     rows = []
-    for group in ('sensor', 'place'):
-        claimed = left_out(samples, group)
+    for group, claimed in claims.items():
         names = np.array([getattr(s, group) for s in samples])
         for name in (*np.unique(names), None):
             own = names == name if name else np.ones(len(names), bool)
@@ -70,7 +70,7 @@ def measure(arguments: Namespace, folder: Path) -> None:
                   'wrong of those that claim 0.99'], rows)))
     inputs.finish(arguments, folder, text, [asdict(s) for s in samples], int(right.sum()),
                   int((~right).sum()))
-    plot_calibration(folder / 'calibration.png', samples, left_out(samples, 'sensor'))
+    plot_calibration(folder / 'calibration.png', samples, claims['sensor'])
 
 
 def _samples(arguments: Namespace) -> Iterator[Sample]:

@@ -79,9 +79,13 @@ def correlated_part(root: Array, parts: Array) -> Array:
     parts : (6, 6) float64
         Covariance `between_parts`.
     """
-    values, vectors = np.linalg.eigh(root @ root.T + PARTS_REPEAT * parts)
-    both: Array = (vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T
-    return both
+    return square_root(root @ root.T + PARTS_REPEAT * parts)
+
+
+def square_root(covariance: Array) -> Array:
+    """Return the symmetric square root of a (6, 6) covariance."""
+    values, vectors = np.linalg.eigh(covariance)
+    return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)) @ vectors.T)
 
 
 def correlated_error(T_target_source: Array, middle_range: float, edge: float) -> Array:

@@ -23,6 +23,7 @@ CLEARLY = 2.0
 """So many times the score of any plane of another direction makes a ground across the sensor's
 axis certain."""
 
+
 @dataclass(frozen=True)
 class Ground:
     """The ground plane of one scan: points x on it have ``normal @ x + offset = 0``.
@@ -178,9 +179,9 @@ def _by_consensus(points: NDArray[np.float64], candidates: NDArray[np.float64],
     length = np.linalg.norm(normals, axis=1, keepdims=True)
     normals = np.divide(normals, length, out=np.zeros_like(normals), where=length > 0)
     offsets = -np.einsum('ij,ij->i', normals, corners[:, 0])
-    flip = _upside_down(normals, offsets, near, config)
-    if up is not None and up.told:
-        flip = normals @ up.direction < 0
+    told = up.direction if up is not None and up.told else None
+    flip = (_upside_down(normals, offsets, near, config) if told is None
+            else normals @ told < 0)
     normals[flip], offsets[flip] = -normals[flip], -offsets[flip]
     sample = candidates[::max(len(candidates) // SAMPLE, 1)]
     heights = times_transposed(sample, normals) + offsets
@@ -188,9 +189,12 @@ def _by_consensus(points: NDArray[np.float64], candidates: NDArray[np.float64],
     score = ((np.abs(heights) < config.sigma_g).sum(axis=0)
              - 3 * (heights < -2 * config.sigma_g).sum(axis=0))
     score[length[:, 0] == 0] = 0
-    if up is not None and up.told and source == 'geometry':
-        score[normals @ up.direction < ALONG] = 0
-    best, certain = _most_likely(normals, score, len(sample), source, up)
+    if source == 'labels':
+        best, certain = int(np.argmax(score)), True
+    else:
+        if told is not None:
+            score[normals @ told < ALONG] = 0
+        best, certain = _most_likely(normals, score, len(sample), up)
     normal, offset = normals[best], float(offsets[best])
     on = np.abs(times_vector(candidates, normal) + offset) < config.sigma_g
     if score[best] <= 0 or on.sum() < config.min_ground_points:
@@ -218,15 +222,13 @@ def _upside_down(normals: NDArray[np.float64], offsets: NDArray[np.float64],
 
 
 def _most_likely(normals: NDArray[np.float64], score: NDArray[np.intp], asked: int,
-                 source: Literal['labels', 'geometry'], up: Up | None) -> tuple[int, bool]:
+                 up: Up | None) -> tuple[int, bool]:
     """Return which plane is the ground, and whether that is certain.
 
     One across the direction up where that is told, or was that of the scan before; else one
     across the sensor's z axis, whichever end is up; else the best.
     """
     best = int(np.argmax(score))
-    if source == 'labels':
-        return best, True
     along = np.abs(normals[:, 2]) if up is None else normals @ up.direction
     if up is not None and not up.told and score[along > ALONG].max(initial=0) < (
             asked * LEAST_GROUND):

@@ -11,8 +11,6 @@ INTERCEPT, OVERLAP, VIOLATIONS = -8.34, 2.85, -3.34
 logarithm of the share that violates free space."""
 FEWEST_VIOLATIONS = 0.005
 """Added to the share that violates: none at all may be chance."""
-LEAST_KEYPOINTS = 300
-"""Of a scan. Nothing with fewer was fitted."""
 
 
 def probability(overlap: float, violations: float) -> float:

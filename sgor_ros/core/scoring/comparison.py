@@ -33,11 +33,11 @@ def ruled_out(answer: NDArray[np.int8], others: NDArray[np.int8]) -> NDArray[np.
     """
     support = (others == AGREES).sum(axis=1)
     against, back = exclusive_violations(answer, others)
-    noise = CLEAR_NOISE * int((answer == VIOLATES).sum())
-    out: NDArray[np.bool_] = against - back >= max(CLEAR_COUNT, CLEAR_SHARE * len(answer)) + noise
+    own, theirs = int((answer == VIOLATES).sum()), (others == VIOLATES).sum(axis=1)
+    clear = max(CLEAR_COUNT, CLEAR_SHARE * len(answer)) + CLEAR_NOISE * own
+    out: NDArray[np.bool_] = against - back >= clear
     out &= against >= CLEAR_RATIO * back
-    many = (others == VIOLATES).sum(axis=1) - CLEAR_RATIO * int((answer == VIOLATES).sum())
-    out |= many >= TOO_MANY * len(answer)
+    out |= theirs - CLEAR_RATIO * own >= TOO_MANY * len(answer)
     out |= support < LEAST_SUPPORT * (answer == AGREES).sum()
     return out
 

@@ -3,6 +3,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .row import Row
 
@@ -35,9 +36,14 @@ class Bin:
 def reliability_diagram(rows: Sequence[Row]) -> list[Bin]:
     """Sort all answers, refused ones too, by confidence; bins without any are left out."""
     known = [row for row in rows if not np.isnan(row.confidence)]
-    confidence = np.array([row.confidence for row in known])
-    right = np.array([row.right and row.within for row in known], bool)
-    where = np.clip(np.digitize(confidence, BINS) - 1, 0, len(BINS) - 2)
-    return [Bin(BINS[i], BINS[i + 1], int(own.sum()), float(confidence[own].mean()),
+    return binned(np.array([row.confidence for row in known]),
+                  np.array([row.right and row.within for row in known], bool), BINS)
+
+
+def binned(confidence: NDArray[np.float64], right: NDArray[np.bool_], edges: Sequence[float]
+           ) -> list[Bin]:
+    """Sort (N,) answers by confidence; bins without any are left out."""
+    where = np.clip(np.digitize(confidence, edges) - 1, 0, len(edges) - 2)
+    return [Bin(edges[i], edges[i + 1], int(own.sum()), float(confidence[own].mean()),
                 int(right[own].sum()))
-            for i in range(len(BINS) - 1) if (own := where == i).any()]
+            for i in range(len(edges) - 1) if (own := where == i).any()]

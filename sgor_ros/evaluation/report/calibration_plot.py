@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from ...io.colours import BLUE
 from ...io.colours import GREY
 from ..calibration import Sample
+from ..metrics.reliability import binned
 from .plots import DPI
 
 ROWS = 4
@@ -35,15 +36,13 @@ def plot_calibration(path: Path, samples: Sequence[Sample], claimed: NDArray[np.
     panels = figure.subplots(ROWS, columns, sharex=True, sharey=True, squeeze=False).ravel()
     for axes, sensor in zip(panels, sensors, strict=False):
         own = names == sensor
-        where = np.clip(np.digitize(claimed[own], EDGES) - 1, 0, len(EDGES) - 2)
-        bins = np.unique(where)
+        bins = binned(claimed[own], right[own], EDGES)
+        points = [(100 * each.mean, 100 * each.right / each.answers) for each in bins]
         axes.plot((0, 100), (0, 100), ':', color=GREY)
-        axes.plot([100 * claimed[own][where == k].mean() for k in bins],
-                  [100 * right[own][where == k].mean() for k in bins], 'o-', color=BLUE)
-        for k in bins:
-            axes.annotate(str(int((where == k).sum())), (
-                100 * claimed[own][where == k].mean(), 100 * right[own][where == k].mean()),
-                xytext=(3, -11), textcoords='offset points', fontsize=7)
+        axes.plot(*zip(*points, strict=True), 'o-', color=BLUE)
+        for each, point in zip(bins, points, strict=True):
+            axes.annotate(str(each.answers), point, xytext=(3, -11), textcoords='offset points',
+                          fontsize=7)
         axes.set_title(f'{sensor} ({int(own.sum())})', fontsize=9, loc='left')
         axes.grid(alpha=0.25)
     for axes in panels[len(sensors):]:
