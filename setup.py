@@ -70,6 +70,8 @@ setup(
         'open3d': [*OPEN3D, 'evo'],    # evo: the errors that the demo shows
         'evaluation': EVALUATION,
         'benchmark': EVALUATION,    # its former name
+        # loops of the `Mapper`; its wheel wants numpy 2
+        'mapping': ['gtsam>=4.3'],
         # to run what docs/pose_graph.md shows
         'slam': ['gtsam>=4.3', 'g2opy'],
         # --visualize; needs numpy 2, which the messages of an installed Jazzy do not take

@@ -13,6 +13,7 @@ from ..io.writing import free_folder
 from ..io.writing import new_folder
 from .benchmarks import ablation
 from .benchmarks import calibrate
+from .benchmarks import loops
 from .benchmarks import pairs
 from .benchmarks import sequence
 from .benchmarks import solver
@@ -40,7 +41,7 @@ class Benchmark(Protocol):
 # a new one: a module in benchmarks/, and a line here
 COMMANDS: dict[str, Benchmark] = {
     'pairs': pairs, 'wrong': wrong, 'calibrate': calibrate, 'ablation': ablation,
-    'sequence': sequence, 'solver': solver}
+    'sequence': sequence, 'loops': loops, 'solver': solver}
 
 
 def main(argv: list[str] | None = None) -> int:

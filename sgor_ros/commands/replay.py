@@ -6,6 +6,7 @@ from pathlib import Path
 import sys
 from typing import TYPE_CHECKING
 
+import numpy as np
 from tqdm import tqdm
 
 from .. import visualize
@@ -24,6 +25,8 @@ from ..io.sequence import ScanSequence
 from ..io.stream_config import StreamConfig
 from ..io.writing import free_folder
 from ..io.writing import new_folder
+from ..mapping import Mapper
+from ..mapping import MapperConfig
 from ..pipeline import extrinsic
 from ..pipeline.outcome import Row
 from ..pipeline.pipeline import Pipeline
@@ -41,6 +44,7 @@ from .options import add_visualize
 from .options import configured
 from .options import PRESETS
 from .options import read_parameters
+from .replay_map import write_map
 from .replay_results import print_results
 from .replay_results import summary_of
 from .replay_results import Warnings
@@ -57,7 +61,7 @@ def main(argv: list[str] | None = None) -> int:
 
 def replay(arguments: Namespace) -> int:
     """Track the scans of a bag or folder and write the results; 1 where none was registered."""
-    parameters = read_parameters(arguments, SgorConfig, TrackerConfig, StreamConfig)
+    parameters = read_parameters(arguments, SgorConfig, TrackerConfig, MapperConfig, StreamConfig)
     stream = configured(StreamConfig(), arguments, parameters)
     mount = extrinsic.configured(stream)
     if stream.base_frame and mount is None:
@@ -70,8 +74,11 @@ def replay(arguments: Namespace) -> int:
         start = PRESETS[arguments.preset]()
         if sequence.label_convention is not None:
             start = start.replace(label_convention=sequence.label_convention)
-        tracker = Tracker(configured(start, arguments, parameters),
-                          configured(TrackerConfig(), arguments, parameters))
+        settings = (configured(start, arguments, parameters),
+                    configured(TrackerConfig(), arguments, parameters))
+        mapper = (Mapper(*settings, configured(MapperConfig(), arguments, parameters))
+                  if arguments.loops else None)
+        tracker = Tracker(*settings) if mapper is None else mapper.tracker
         label_convention(tracker.config.label_convention)
         output: Path = arguments.output or free_folder(_usual_output(arguments))
         place = stack.enter_context(new_folder(output))
@@ -81,11 +88,19 @@ def replay(arguments: Namespace) -> int:
             warm_up(tracker.config)
             view = (None if arguments.visualize is None else stack.enter_context(
                 visualize.track_view(arguments.visualize, tracker.config)))
-            pipeline = Pipeline(tracker, stream, BagSink(writer) if writer else None, mount)
+            pipeline = Pipeline(mapper or tracker, stream, BagSink(writer) if writer else None,
+                                mount)
             rows, broken = _run(sequence, pipeline, view, warnings)
         summary = summary_of(rows, warnings.texts, arguments.bag_path, sequence.name, tracker,
                              stream)
-        write_results(place, rows, summary, f'{arguments.bag_path.name} {sequence.name}')
+        title = f'{arguments.bag_path.name} {sequence.name}'
+        if mapper is not None:
+            T_base_sensor = np.eye(4) if mount is None else mount(0, '')
+            assert not isinstance(T_base_sensor, str), 'it is fixed'
+            mapper.finish()
+            summary['map'] = write_map(place, mapper, rows, T_base_sensor,
+                                       sequence.T_world_sensor, title)
+        write_results(place, rows, summary, title)
     print_results(summary, output)
     if broken:
         raise InputError(f'after {len(rows)} scans: {broken}')
@@ -153,11 +168,15 @@ def _parser() -> Parser:
                          'name of the bag, and _2, _3, ... behind it where that exists')
     command.add_argument('--bag', action='store_true',
                          help='also write a bag with /pose, /odometry and /correspondences')
+    command.add_argument('--loops', action='store_true', help='close loops: also write corrected '
+                         'trajectories, graph.g2o with the stamps of its nodes, map.ply, map.pcd '
+                         'and loops.png')
     add_visualize(command)
     add_params_file(command)
     add_preset(command)
     add_settings(command, 'clouds and frames', StreamConfig)
     add_settings(command, 'tracker', TrackerConfig)
+    add_settings(command, 'loops', MapperConfig)
     add_settings(command, 'registration (defaults are those of the preset outdoor)', SgorConfig)
     return command
 

@@ -97,6 +97,11 @@ def write_results(output: Path, rows: list[Row], summary: dict[str, Any], title:
 def print_results(summary: dict[str, Any], output: Path) -> None:
     """Print how it went, and what was written."""
     total = summary['timings_ms']['total']
+    if 'map' in summary:
+        told = summary['map']
+        error = (f'; APE {told["ape_before_m"]:.2f} m before, {told["ape_after_m"]:.2f} m after'
+                 if 'ape_after_m' in told else '')
+        print(f'{len(told["loops"])} loops closed among {told["nodes"]} nodes{error}')
     print(f'{summary["successes"]} of {summary["scans"]} scans have a pose; time per scan: median '
           f'{total["median"]:.0f} ms, p95 {total["p95"]:.0f} ms\n'
           f'wrote {output}: {", ".join(sorted(path.name for path in output.iterdir()))}')

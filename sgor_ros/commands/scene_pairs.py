@@ -18,6 +18,9 @@ from ..io.datasets import DriveScan
 if TYPE_CHECKING:
     from ..world import Lidar
 
+STREET_STEP_M, LANE_M = 1.2, 2.6
+"""Between two scans of a drive down a street, and between its lanes."""
+
 
 def scene_kinds(names: Sequence[str]) -> dict[str, bool]:
     """Return the kinds asked for, or all, and whether their places repeat themselves.
@@ -85,3 +88,33 @@ def scene_drive(kind: str, count: int, seed: int) -> Drive:
     """Drive through the place of a kind and a seed, as far apart as its scans are meant to be."""
     from ..world import simulate
     return drive_of(kind, (scan[1:] for scan in simulate(count, seed, place=kind)))
+
+
+def return_drive(kind: str, way: float, seed: int, lidar: Lidar) -> Drive:
+    """Scan a drive through a place and back: the street's round, or the path of another kind.
+
+    Parameters
+    ----------
+    kind : str
+        'street', where the way back is in the other lane, or the name of a kind.
+    way : float
+        Of the way there at most, metres; of the street one round.
+    seed : int
+        Chooses place and noise.
+    lidar : Lidar
+    """
+    from .. import world
+    from ..world import scenes
+    from ..world.return_trip import there_and_back
+    rng = np.random.default_rng([seed, 3])
+    scene: world.Scene
+    if kind == world.STREET:
+        scene = street = world.street_scene(seed)
+        count = int(min(way, street.layout.loop.length) / STREET_STEP_M)
+        poses = there_and_back(
+            world.loop_trajectory(street, count, speed=STREET_STEP_M, period=1.0), LANE_M)
+    else:
+        scene = place = scenes.make(kind, seed)
+        step = scenes.KINDS[kind].step
+        poses = there_and_back(scenes.drive(place, int(min(way, place.way) / step), step))
+    return drive_of(f'{kind}/{seed}', ((*lidar.scan(scene, T, rng), T) for T in poses))

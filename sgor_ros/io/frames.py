@@ -82,10 +82,32 @@ class OdomFrame:
     def __init__(self) -> None:
         self._starts: dict[int, _Start] = {}
         self._next: tuple[Array, Array] | None = None
+        self._T_map_first: Array | None = None
 
     def begin_at(self, T_odom_child: Array, covariance: Array) -> None:
         """Let the next track begin at a pose of the frame that is published."""
         self._next = T_odom_child, covariance
+
+    def go_on_at(self, T_odom_child: Array, covariance: Array) -> None:
+        """Let the next track begin at a pose, unless `begin_at` has said another."""
+        self._next = self._next or (T_odom_child, covariance)
+
+    def knows(self, track_id: int) -> bool:
+        """Whether a scan of the track has been placed."""
+        return track_id in self._starts
+
+    def in_map(self, T_first_sensor: Array) -> Array:
+        """Return poses (..., 4, 4) in the frame of the mapper, of the first scan, in the map."""
+        assert self._T_map_first is not None, 'a track has been placed'
+        return self._T_map_first @ T_first_sensor
+
+    def map_to_odom(self, track_id: int, T_map_track: Array) -> Array:
+        """Return the pose of the odom frame in the map, (4, 4).
+
+        The map begins where the odom frame does. A track that is placed in it lies in the mapper's
+        frame, that of the first scan, at `T_map_track`.
+        """
+        return self.in_map(T_map_track) @ se3.inverse(self._starts[track_id].T_odom_sensor)
 
     def place(self, tracked: TrackedScan, T_base_sensor: Array | None) -> TrackedScan:
         """Return a scan of the track with pose, covariance and twist of the base.
@@ -106,6 +128,8 @@ class OdomFrame:
             # tracks that can come back are few
             self._starts = dict(list(self._starts.items())[-REMEMBERED:])
             start = self._starts[tracked.track_id] = _Start(T @ mount, T, covariance)
+            if self._T_map_first is None:
+                self._T_map_first = start.T_odom_sensor
         return _doubted(of_base(in_odom(tracked, start.T_odom_sensor), mount), start)
 
     def of_sensor(self, tracked: TrackedScan) -> TrackedScan:

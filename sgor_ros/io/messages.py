@@ -5,6 +5,7 @@ want all fields, those of rclpy take them all, so every field is given.
 """
 import array
 from collections.abc import Callable
+from collections.abc import Iterable
 import dataclasses
 from typing import Any
 
@@ -15,6 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from ..core.common import se3
 from ..core.verdict.result import Registration
+from ..mapping.result import Loop
 from ..tracker import TrackedScan
 from .pointcloud2 import encode
 
@@ -132,6 +134,22 @@ def relative_pose(types: Types, tracked: TrackedScan, sensor_frame: str,
     return odometry_of(types, T_reference_sensor, tracked.stamp_ns,
                        f'{reference_frame or sensor_frame}@{tracked.reference_stamp_ns}',
                        f'{sensor_frame}@{tracked.stamp_ns}', tracked.reference_covariance)
+
+
+def loop_closure(types: Types, loop: Loop, sensor_frame: str) -> Any:
+    """Return a nav_msgs/msg/Odometry of a loop, in the form of `relative_pose`."""
+    return odometry_of(types, loop.T_target_source, loop.source_stamp_ns,
+                       f'{sensor_frame}@{loop.target_stamp_ns}',
+                       f'{sensor_frame}@{loop.source_stamp_ns}', loop.covariance)
+
+
+def path(types: Types, stamps_ns: Iterable[int], poses: Iterable[NDArray[np.float64]],
+         stamp_ns: int, frame: str) -> Any:
+    """Return a nav_msgs/msg/Path of (4, 4) poses."""
+    stamped = types('geometry_msgs/msg/PoseStamped')
+    return types('nav_msgs/msg/Path')(header=header(types, stamp_ns, frame), poses=[
+        stamped(header=header(types, of, frame), pose=pose(types, T))
+        for of, T in zip(stamps_ns, poses, strict=True)])
 
 
 def odometry_of(types: Types, T: NDArray[np.float64], stamp_ns: int, frame: str,

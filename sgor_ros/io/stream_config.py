@@ -18,6 +18,8 @@ class StreamConfig(Settings):
         f'{", ".join(LABEL_FIELDS)} that a cloud has; none: work without labels')
     odom_frame: str = setting(
         'odom', 'Frame of the published poses; its origin is the first scan')
+    map_frame: str = setting(
+        'map', 'Frame of the corrected poses, where loops are closed')
     sensor_frame: str = setting(
         '', 'Frame of the sensor in what is published; empty: the frame_id of each scan')
     base_frame: str = setting(
@@ -29,13 +31,14 @@ class StreamConfig(Settings):
     def __post_init__(self) -> None:
         """Check the frames too."""
         super().__post_init__()
-        if not self.odom_frame:
-            raise InputError("odom_frame = '': a frame needs a name")
+        for name in ('odom_frame', 'map_frame'):
+            if not getattr(self, name):
+                raise InputError(f"{name} = '': a frame needs a name")
         if self.T_base_sensor:
             parse_transform(self.T_base_sensor, 'T_base_sensor')
             if not self.base_frame:
                 raise InputError(f'T_base_sensor = {self.T_base_sensor!r}: it needs a base_frame')
-        for name in ('odom_frame', 'sensor_frame', 'base_frame'):
+        for name in ('odom_frame', 'map_frame', 'sensor_frame', 'base_frame'):
             if getattr(self, name).startswith('/'):
                 raise InputError(f'{name} = {getattr(self, name)!r}: frame ids have no leading '
                                  'slash')

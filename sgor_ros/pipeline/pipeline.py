@@ -2,6 +2,7 @@
 from collections.abc import Iterator
 from dataclasses import replace
 import logging
+import math
 import time
 from typing import Any
 
@@ -16,13 +17,19 @@ from ..io.frames import frame_id
 from ..io.frames import OdomFrame
 from ..io.sequence import StampedScan
 from ..io.stream_config import StreamConfig
+from ..mapping import MappedScan
+from ..mapping import Mapper
+from ..mapping.map_cloud import map_cloud
 from ..tracker import TrackedScan
 from ..tracker import Tracker
 from .extrinsic import Extrinsic
 from .outcome import Outcome
 from .sinks import CORRESPONDENCES
+from .sinks import LOOP_CLOSURE
+from .sinks import MAP_CLOUD
 from .sinks import MessageSink
 from .sinks import ODOMETRY
+from .sinks import PATH
 from .sinks import POSE
 from .sinks import RELATIVE_POSE
 from .sinks import TF
@@ -41,7 +48,8 @@ class Pipeline:
 
     Parameters
     ----------
-    tracker : Tracker
+    tracker : Tracker or Mapper
+        A mapper closes loops, too.
     config : StreamConfig
         Names of the frames.
     sink : MessageSink, optional
@@ -54,11 +62,14 @@ class Pipeline:
     Attributes
     ----------
     tracker : Tracker
+    mapper : Mapper or None
     """
 
-    def __init__(self, tracker: Tracker, config: StreamConfig, sink: MessageSink | None = None,
-                 extrinsic: Extrinsic | None = None, *, inverted_tf: bool = False) -> None:
-        self.tracker = tracker
+    def __init__(self, tracker: Tracker | Mapper, config: StreamConfig,
+                 sink: MessageSink | None = None, extrinsic: Extrinsic | None = None, *,
+                 inverted_tf: bool = False) -> None:
+        self.mapper = tracker if isinstance(tracker, Mapper) else None
+        self.tracker = tracker.tracker if isinstance(tracker, Mapper) else tracker
         self._config = config
         self._sink = sink
         self._extrinsic = extrinsic
@@ -66,6 +77,7 @@ class Pipeline:
         self._odom_frame = OdomFrame()
         self._frame = ''
         self._keyframe_frames: dict[int, str] = {}
+        self._placed: TrackedScan | None = None
 
     def begin_at(self, T_odom_child: NDArray[np.float64], covariance: NDArray[np.float64]) -> None:
         """Let the next track begin at a pose, (4, 4) with (6, 6), of the frame it publishes."""
@@ -107,7 +119,7 @@ class Pipeline:
                        seconds), published
 
     def _track(self, scan: SemanticScan, stamp_ns: int, frame: str) -> TrackedScan:
-        tracked = self.tracker.track(scan, stamp_ns)
+        tracked = (self.mapper or self.tracker).track(scan, stamp_ns)
         before, self._frame = self._frame, frame
         if before in ('', frame) or tracked.restarted:
             return tracked
@@ -117,12 +129,33 @@ class Pipeline:
 
     def _place(self, tracked: TrackedScan, frame: str) -> TrackedScan | str:
         """Return the scan as one of the base, in the odom frame, or why it cannot be placed."""
-        if not tracked.success or self._extrinsic is None:
-            return self._odom_frame.place(tracked, None)
-        T_base_sensor = self._extrinsic(tracked.stamp_ns, frame)
-        if isinstance(T_base_sensor, str):
-            return T_base_sensor
-        return self._odom_frame.place(tracked, T_base_sensor)
+        T_base_sensor: NDArray[np.float64] | None = None
+        if tracked.success and self._extrinsic is not None:
+            found = self._extrinsic(tracked.stamp_ns, frame)
+            if isinstance(found, str):
+                return found
+            T_base_sensor = found
+        if self.mapper is not None and tracked.restarted and self._placed is not None:
+            # odom never jumps where there is a map: the map does (REP-105)
+            self._odom_frame.go_on_at(*self._predicted(self._placed, tracked.stamp_ns))
+        placed = self._odom_frame.place(tracked, T_base_sensor)
+        if placed.T_odom_sensor is not None:
+            self._placed = placed
+        return placed
+
+    def _predicted(self, placed: TrackedScan, stamp_ns: int
+                   ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return where a pose leads to if it goes on as it did, and what is known of that.
+
+        Whatever ended the track, the bounds on its motion hold: half of them is one sigma.
+        """
+        assert placed.T_odom_sensor is not None
+        config, seconds = self.tracker.tracker_config, (stamp_ns - placed.stamp_ns) * 1e-9
+        ahead = np.eye(4) if placed.twist is None else se3.exp(placed.twist * seconds)
+        sigma = np.array([config.max_speed / 2 * seconds] * 3
+                         + [min(config.max_turn_rate / 2 * seconds, math.pi)] * 3)
+        before = np.zeros((6, 6)) if placed.covariance is None else placed.covariance
+        return placed.T_odom_sensor @ ahead, before + np.diag(sigma**2)
 
     def _messages(self, sink: MessageSink, tracked: TrackedScan, placed: TrackedScan | str,
                   frame: str, reference_frame: str) -> Iterator[tuple[str, Any]]:
@@ -131,6 +164,8 @@ class Pipeline:
         if tracked.success and tracked.T_reference_sensor is not None:
             yield RELATIVE_POSE, messages.relative_pose(sink.types, tracked, frame,
                                                         reference_frame)
+        if isinstance(tracked, MappedScan):
+            yield from self._map_messages(sink, tracked, frame)
         if isinstance(placed, str):
             return
         if placed.T_odom_sensor is not None:
@@ -144,3 +179,31 @@ class Pipeline:
         if sink.wants(CORRESPONDENCES):
             yield CORRESPONDENCES, messages.correspondence_markers(
                 sink.types, self._odom_frame.of_sensor(tracked), odom)
+
+    def _map_messages(self, sink: MessageSink, mapped: MappedScan, frame: str
+                      ) -> Iterator[tuple[str, Any]]:
+        """Yield what a mapper adds: loops, where odom lies in the map, and the way in it."""
+        assert self.mapper is not None
+        for loop in mapped.loops:
+            yield LOOP_CLOSURE, messages.loop_closure(sink.types, loop, frame)
+        if mapped.T_map_odom is None or not self._odom_frame.knows(mapped.track_id):
+            return
+        T_map_odom = self._odom_frame.map_to_odom(mapped.track_id, mapped.T_map_odom)
+        of_map, of_odom = self._config.map_frame, self._config.odom_frame
+        if sink.wants(TF):
+            ends = (of_odom, of_map) if self._inverted_tf else (of_map, of_odom)
+            T = se3.inverse(T_map_odom) if self._inverted_tf else T_map_odom
+            yield TF, messages.tf_message(sink.types, T, mapped.stamp_ns, *ends)
+        if (mapped.keyframe or mapped.loops) and sink.wants(PATH):
+            stamps_ns, poses = self.mapper.node_poses()
+            yield PATH, messages.path(sink.types, stamps_ns, self._odom_frame.in_map(poses),
+                                      mapped.stamp_ns, of_map)
+        if mapped.keyframe and sink.wants(MAP_CLOUD):
+            yield MAP_CLOUD, messages.point_cloud2(
+                sink.types, *self._map_cloud(), mapped.stamp_ns, of_map)
+
+    def _map_cloud(self) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
+        assert self.mapper is not None
+        points, labels = map_cloud(self.mapper.keyframes, self.mapper.graph)
+        moved = se3.transform(self._odom_frame.in_map(np.eye(4)), points.astype(np.float64))
+        return moved.astype(np.float32), labels

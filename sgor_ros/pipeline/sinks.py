@@ -7,6 +7,8 @@ from ..io.bags import BagWriter
 
 ODOMETRY, POSE, RELATIVE_POSE, CORRESPONDENCES = (
     'odometry', 'pose', 'relative_pose', 'correspondences')
+LOOP_CLOSURE, PATH, MAP_CLOUD = 'loop_closure', 'path', 'map_cloud'
+"""Of the mapper alone."""
 TF = '/tf'
 
 
@@ -24,15 +26,15 @@ class MessageSink(Protocol):
 
 
 class BagSink:
-    """Writes what a node publishes into a bag, all but the transform on /tf."""
+    """Writes what a node publishes into a bag, all but what can be had from it."""
 
     def __init__(self, writer: BagWriter) -> None:
         self._writer = writer
         self.types: Callable[[str], Any] = writer.types
 
     def wants(self, topic: str) -> bool:
-        """Whether it is one of the results: transforms can be had from the odometry."""
-        return topic != TF
+        """Whether it is one of the results that cannot be had from the others."""
+        return topic not in (TF, PATH, MAP_CLOUD)
 
     def write(self, topic: str, message: Any, arrived_ns: int) -> None:
         """Write a message as recorded when its scan was."""

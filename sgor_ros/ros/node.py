@@ -1,4 +1,5 @@
 """`SgorNode`: clouds of a topic to the pipeline on a thread of its own, and its health told."""
+from concurrent.futures import ProcessPoolExecutor
 import threading
 import time
 from typing import Any
@@ -10,7 +11,10 @@ from ..core.warmup import warm_up
 from ..io import messages
 from ..io.sequence import ScanSequence
 from ..io.sequence import StampedScan
+from ..mapping import Mapper
 from ..pipeline import extrinsic
+from ..pipeline.loop_process import end
+from ..pipeline.loop_process import loop_process
 from ..pipeline.pipeline import Pipeline
 from ..tracker import State
 from ..tracker import Tracker
@@ -48,6 +52,7 @@ class SgorNode(Node):
         super().__init__(name, **options)
         self._settings = NodeParameters(self)
         self._config = self._settings.node_config
+        self._loops: ProcessPoolExecutor | None = None
         self._pipeline = self._pipeline_of(self._config)
         self._requests = Services(self, self._config.odom_frame)
         self._stream = CloudStream(self.resolve_topic_name('points'), self._config.label_field)
@@ -62,12 +67,17 @@ class SgorNode(Node):
         refuse_unknown_overrides(self, override_names(self))
 
     def _pipeline_of(self, config: NodeConfig) -> Pipeline:
-        sink = TopicSink(self, config.publish_tf)
+        sink = TopicSink(self, config.publish_tf, config.loop_closure)
         mount = extrinsic.configured(config)
         if mount is None and config.base_frame:
             mount = tf2_extrinsic(self, config.base_frame)
-        return Pipeline(Tracker(*self._settings.live), config, sink, mount,
-                        inverted_tf=config.invert_tf)
+        return Pipeline(self._tracker(config), config, sink, mount, inverted_tf=config.invert_tf)
+
+    def _tracker(self, config: NodeConfig) -> Tracker | Mapper:
+        if not config.loop_closure:
+            return Tracker(*self._settings.live)
+        self._loops = loop_process()
+        return Mapper(*self._settings.live, self._settings.mapper_config, executor=self._loops)
 
     def start(self) -> None:
         """Begin to work; clouds are subscribed to once everything is compiled."""
@@ -81,6 +91,8 @@ class SgorNode(Node):
         self._stream.close()
         if self._worker.is_alive():
             self._worker.join(GRACE_S if self._compiled else 0.0)
+        if self._loops is not None:
+            end(self._loops)
         return not self._worker.is_alive()
 
     def counts(self) -> status.Counts:
@@ -124,6 +136,8 @@ class SgorNode(Node):
         begin = time.monotonic()
         with forwarded(log):
             warm_up(self._settings.live[0])
+        if self._loops is not None:
+            self._loops.submit(int)    # anything: it starts
         log.info(f'ready after {time.monotonic() - begin:.1f} s, waiting for clouds on '
                  f'{self._stream.name}')
 
@@ -148,7 +162,8 @@ class SgorNode(Node):
         self._failed += not done and not late
         now = time.monotonic()
         self._diagnostics.report(outcome.stamp_ns, outcome.frame, *status.level_of(outcome), {
-            **status.details(tracked), 'seconds': f'{now - self._began_at:.4f}',
+            **status.details(tracked), **status.map_details(self._pipeline.mapper),
+            'seconds': f'{now - self._began_at:.4f}',
             'latency': f'{now - scan.arrived_ns * 1e-9:.4f}'})
 
     def _apply_requests(self) -> None:

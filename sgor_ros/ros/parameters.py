@@ -28,6 +28,7 @@ from ..core.common.settings import Value
 from ..core.config import SgorConfig
 from ..core.scan.labels import label_convention
 from ..io.stream_config import StreamConfig
+from ..mapping import MapperConfig
 from ..tracker import TrackerConfig
 
 LARGEST_INTEGER = 2**31 - 1
@@ -40,6 +41,9 @@ class NodeConfig(StreamConfig):
     reliability: str = setting(
         'auto', 'QoS of the subscription; auto: reliable, which loses no large clouds, until a '
         'publisher turns up that is best effort only', choices=('auto', 'reliable', 'best_effort'))
+    loop_closure: bool = setting(
+        False, 'Close loops: publish loop_closure, path and map_cloud, and with publish_tf the '
+        'transform from map_frame to odom_frame; needs GTSAM')
     publish_tf: bool = setting(
         False, 'Publish the transform from odom_frame to base_frame, or to the sensor frame, on '
         '/tf')
@@ -53,6 +57,7 @@ class NodeParameters:
     Attributes
     ----------
     node_config : NodeConfig
+    mapper_config : MapperConfig
     live : (SgorConfig, TrackerConfig)
         The newest; replaced as a whole, so any thread may read it.
     """
@@ -60,6 +65,7 @@ class NodeParameters:
     def __init__(self, node: Node) -> None:
         self._node = node
         self.node_config = NodeConfig.from_values(_declare(node, NodeConfig, read_only=True))
+        self.mapper_config = MapperConfig.from_values(_declare(node, MapperConfig, read_only=True))
         self.live = (SgorConfig.from_values(_declare(node, SgorConfig)),
                      TrackerConfig.from_values(_declare(node, TrackerConfig)))
         label_convention(self.live[0].label_convention)
@@ -150,6 +156,7 @@ def yaml_files() -> dict[str, str]:
             'All parameters of sgor_node with their defaults.',
             ('Registration; these can be changed while the node runs', SgorConfig.shown(), {}),
             ('Tracker; these can be changed while the node runs', TrackerConfig.shown(), {}),
+            ('Loops; read when it starts', MapperConfig.shown(), {}),
             ('Node; read when it starts', NodeConfig.shown(), {})),
         'indoor.yaml': _yaml(
             'Rooms of a few metres: what differs from the defaults.',

@@ -48,6 +48,8 @@ class Tracker:
     for long, a new track begins, with a number of its own.
     """
 
+    _reference: Keyframe | None
+
     def __init__(self, config: SgorConfig | None = None,
                  tracker_config: TrackerConfig | None = None) -> None:
         self.config = SgorConfig.given(config)
@@ -62,6 +64,17 @@ class Tracker:
         """Forget everything: the next scan is the origin of a new track."""
         self._stamps = Stamps()
         self._forget()
+
+    @property
+    def reference(self) -> Keyframe | None:
+        """What the next scan is registered to: the last scan itself where it became a keyframe."""
+        return self._reference
+
+    def begin_track(self) -> None:
+        """Let the next scan be the origin of a new track; earlier ones can still come back."""
+        if self._reference is not None:
+            self._keyframes.keep(self._reference, self.tracker_config.max_keyframes)
+        self._reference = None
 
     def track(self, scan: SemanticScan, stamp_ns: int) -> TrackedScan:
         """Take the next scan.
@@ -117,7 +130,7 @@ class Tracker:
 
     def _forget(self) -> None:
         self._keyframes = Keyframes()
-        self._reference: Keyframe | None = None
+        self._reference = None
         self._up = None
         self._motion = Motion.unknown(0, np.eye(4), np.zeros((6, 6)), self.tracker_config)
         self._track_id = self._tracks

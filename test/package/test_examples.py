@@ -12,7 +12,7 @@ import pytest
 from sgor_ros.world import simulate
 
 EXAMPLES = Path(__file__).resolve().parents[2] / 'examples'
-TESTED = {'bag', 'label_convention', 'own_features', 'own_labels', 'pose_graph_g2o',
+TESTED = {'bag', 'label_convention', 'loops', 'own_features', 'own_labels', 'pose_graph_g2o',
           'pose_graph_gtsam', 'register_two_scans'}
 
 
@@ -94,3 +94,12 @@ def test_an_example_runs_as_a_script():
     done = subprocess.run([sys.executable, EXAMPLES / 'bag.py'], capture_output=True, text=True,
                           check=True)
     assert len(done.stdout.splitlines()) == 5
+
+
+def test_loops_are_closed_on_the_way_back(capsys):
+    pytest.importorskip('gtsam')
+    mapper = example('loops').main()
+    printed = capsys.readouterr().out.splitlines()
+    assert len(printed) == len(mapper.graph.loops) + 1 > 6
+    # turned round in the other lane, 2.6 m to the left of where it began
+    np.testing.assert_allclose(mapper.trajectory().T_map_sensor[-1, :3, 3], [0, 2.6, 0], atol=0.1)

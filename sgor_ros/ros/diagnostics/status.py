@@ -6,6 +6,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from diagnostic_msgs.msg import KeyValue
 
 from ...io.messages import header
+from ...mapping import Mapper
 from ...pipeline.outcome import Outcome
 from ...tracker import State
 from ...tracker import TrackedScan
@@ -82,3 +83,12 @@ def details(tracked: TrackedScan | None) -> dict[str, str]:
         shown['inliers'] = str(int(step.inliers.sum()))
         shown['correspondences'] = str(len(step.inliers))
     return shown
+
+
+def map_details(mapper: Mapper | None) -> dict[str, str]:
+    """Return the same of the map, with what was put off; nothing where no loops are closed."""
+    if mapper is None:
+        return {}
+    return {'loops': str(len(mapper.graph.loops)), 'keyframes': str(len(mapper.keyframes)),
+            'loop candidates waiting': str(len(mapper.candidates)),
+            'loop candidates put off': str(mapper.candidates.put_off)}

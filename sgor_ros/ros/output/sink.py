@@ -5,7 +5,10 @@ from rclpy.node import Node
 
 from ...core.common.settings import InputError
 from ...pipeline.sinks import CORRESPONDENCES
+from ...pipeline.sinks import LOOP_CLOSURE
+from ...pipeline.sinks import MAP_CLOUD
 from ...pipeline.sinks import ODOMETRY
+from ...pipeline.sinks import PATH
 from ...pipeline.sinks import POSE
 from ...pipeline.sinks import RELATIVE_POSE
 from ...pipeline.sinks import TF
@@ -20,6 +23,14 @@ TOPICS = {
     CORRESPONDENCES: ('visualization_msgs/msg/MarkerArray', 1),
 }
 """Topic to type and depth of the queue."""
+MAP_TOPICS = {
+    LOOP_CLOSURE: ('nav_msgs/msg/Odometry', 100),
+    PATH: ('nav_msgs/msg/Path', 1),
+    MAP_CLOUD: ('sensor_msgs/msg/PointCloud2', 1),
+}
+"""The same where loops are closed."""
+FOR_LISTENERS = (CORRESPONDENCES, PATH, MAP_CLOUD)
+"""Dear, so only made where somebody listens."""
 
 TF_DEPTH = 100
 """As tf2's broadcaster has it."""
@@ -33,6 +44,8 @@ class TopicSink:
     node : Node
     tf : bool
         Whether to publish the transform of the odometry on /tf, too.
+    loops : bool
+        Whether loops are closed.
 
     Raises
     ------
@@ -42,16 +55,17 @@ class TopicSink:
 
     types = staticmethod(ros_type)
 
-    def __init__(self, node: Node, tf: bool) -> None:
+    def __init__(self, node: Node, tf: bool, loops: bool = False) -> None:
+        topics = TOPICS | (MAP_TOPICS if loops else {})
         self._publishers = {topic: publisher(node, ros_type(kind), topic, depth)
-                            for topic, (kind, depth) in TOPICS.items()}
+                            for topic, (kind, depth) in topics.items()}
         if tf:
             self._publishers[TF] = publisher(node, _tf_message(), TF, TF_DEPTH)
 
     def wants(self, topic: str) -> bool:
-        """Whether a topic is published; markers are dear, and made only for those who listen."""
+        """Whether a topic is published, and somebody listens where it is dear to make."""
         return topic in self._publishers and (
-            topic != CORRESPONDENCES or self._publishers[topic].get_subscription_count() > 0)
+            topic not in FOR_LISTENERS or self._publishers[topic].get_subscription_count() > 0)
 
     def write(self, topic: str, message: Any, arrived_ns: int) -> None:
         """Publish a message."""

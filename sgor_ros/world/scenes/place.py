@@ -52,6 +52,12 @@ class Place(Scene):
     repeats: tuple[float, float]
     follows_slope: bool = True
 
+    @property
+    def way(self) -> float:
+        """Length of the path, m; of a round where it is closed."""
+        path = np.vstack([self.path, self.path[:1]]) if self.closed else self.path
+        return float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
+
 
 def finish(plot: Plot, area: Rectangle, *, closed: bool = False, sensor_height: float = 1.7,
            clearance: float = 0.8,

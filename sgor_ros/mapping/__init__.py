@@ -1,0 +1,15 @@
+"""Loops and a pose graph on top of the tracker, without ROS and without files.
+
+`mapper` is the way of one scan. Beside it: `odometry` (nodes and edges out of tracked scans),
+`keyframe` (what is kept of a scan), `retrieval` (which look alike), `candidates` (which pairs to
+try and when), `verification` (they are registered), `loop_consistency` (which loops to believe, by
+`paths`: the surest way between two nodes), `pose_graph` (GTSAM), `edge` and `result` (what goes in
+and out). `map_cloud` (the map as one cloud).
+"""
+from .config import MapperConfig
+from .mapper import Mapper
+from .result import Loop
+from .result import MappedScan
+from .result import Trajectory
+
+__all__ = ['Loop', 'MappedScan', 'Mapper', 'MapperConfig', 'Trajectory']

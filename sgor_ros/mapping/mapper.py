@@ -1,0 +1,220 @@
+"""The way of a scan through the mapper, on one screen."""
+from concurrent.futures import Executor
+from dataclasses import fields
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core.common import se3
+from ..core.config import SgorConfig
+from ..core.prepared_scan import PreparedScan
+from ..core.preprocessing import preprocess
+from ..core.scan.scan import SemanticScan
+from ..tracker import State
+from ..tracker import TrackedScan
+from ..tracker import Tracker
+from ..tracker import TrackerConfig
+from .candidates import Candidate
+from .candidates import Candidates
+from .candidates import Surroundings
+from .config import MapperConfig
+from .edge import Edge
+from .edge import Kind
+from .keyframe import Keyframes
+from .loop_consistency import LoopConsistency
+from .odometry import Node
+from .odometry import Odometry
+from .pose_graph import PoseGraph
+from .result import Loop
+from .result import MappedScan
+from .result import Trajectory
+from .verification import Verification
+
+Array = NDArray[np.float64]
+
+NOWHERE = -1
+"""In place of the node of a scan that has none."""
+
+
+class Mapper:
+    """Tracks each scan, closes loops among keyframes, and keeps all poses optimised.
+
+    Without GTSAM it goes on as odometry, and says so once.
+
+    Parameters
+    ----------
+    config : SgorConfig, optional
+    tracker_config : TrackerConfig, optional
+    mapper_config : MapperConfig, optional
+    executor : concurrent.futures.Executor, optional
+        Where candidates of loops are registered, in processes of its own; without it here, with
+        each scan a few.
+
+    Attributes
+    ----------
+    tracker : Tracker
+    mapper_config : MapperConfig
+    graph : PoseGraph
+        A node for each keyframe of the tracker.
+    keyframes : Keyframes
+        Those of them whose scans are kept.
+    consistency : LoopConsistency
+    candidates : Candidates
+    """
+
+    def __init__(self, config: SgorConfig | None = None,
+                 tracker_config: TrackerConfig | None = None,
+                 mapper_config: MapperConfig | None = None, *,
+                 executor: Executor | None = None) -> None:
+        self.tracker = Tracker(config, tracker_config)
+        self.mapper_config = MapperConfig.given(mapper_config)
+        self.graph = PoseGraph()
+        self.keyframes = Keyframes()
+        self.consistency = LoopConsistency()
+        self.candidates = Candidates()
+        self._odometry = Odometry()
+        self._verification = Verification(executor)
+        self._closes_loops = bool(self.mapper_config.registrations_per_scan
+                                  and not self.graph.missing)
+        self._notes = [self.graph.missing] if self.graph.missing else []
+
+    def track(self, scan: SemanticScan, stamp_ns: int) -> MappedScan:
+        """Take the next scan: its pose by odometry, and the loops that it closed.
+
+        Parameters
+        ----------
+        scan : SemanticScan
+        stamp_ns : int
+            Its stamp, nanoseconds, as of `Tracker.track`.
+        """
+        tracked = self.tracker.track(scan, stamp_ns)
+        if tracked.state in (State.FAILED, State.LOST) and self._is_elsewhere(scan):
+            self.tracker.begin_track()
+            self._notes.append('the sensor is at another place of the map: a new track begins')
+        keyframe = self.tracker.reference if tracked.keyframe else None
+        return self.add(tracked, None if keyframe is None else keyframe.prepared)
+
+    def add(self, tracked: TrackedScan, prepared: PreparedScan | None) -> MappedScan:
+        """Take a scan that has been tracked; prepared, where the tracker made a keyframe of it."""
+        if tracked.T_odom_sensor is not None:
+            T_map_sensor = self._odometry.last_pose(self.graph)
+            added = self._odometry.add(tracked, self.tracker.tracker_config)
+            if added is not None:
+                assert prepared is not None, 'a keyframe comes with its prepared scan'
+                self._add_node(*added, prepared, T_map_sensor)
+        # where a track begins, its place in the map is what the scan is waited for
+        loops = self._work(at_once=tracked.restarted)
+        notes, self._notes = self._notes, []
+        told = {item.name: getattr(tracked, item.name) for item in fields(tracked)}
+        return MappedScan(**{**told, 'warnings': (*tracked.warnings, *notes)},
+                          loops=tuple(self._loop_of(edge) for edge in loops),
+                          T_map_odom=self._T_map_odom(tracked))
+
+    def finish(self) -> tuple[Loop, ...]:
+        """Work on all candidates that wait, however long it takes; return the loops closed."""
+        closed: list[Edge] = []
+        while self._closes_loops and (len(self.candidates) or len(self._verification)):
+            closed += self._work(wait=True)
+        return tuple(self._loop_of(edge) for edge in closed)
+
+    def offer(self, loop: Loop) -> tuple[Loop, ...]:
+        """Take a loop from elsewhere; return those that are believed now that there is one more.
+
+        Raises
+        ------
+        InputError
+            One of its stamps is of no keyframe.
+        """
+        source, target = (self._odometry.node_at(stamp_ns) for stamp_ns in (
+            loop.source_stamp_ns, loop.target_stamp_ns))
+        edge = Edge(target, source, loop.T_target_source, loop.covariance, Kind.LOOP)
+        return tuple(self._loop_of(closed) for closed in self._offer([edge]))
+
+    def trajectory(self, *, loops: bool = True) -> Trajectory:
+        """Return the optimised pose of every scan that has one, or that by odometry alone."""
+        return self._odometry.trajectory(self.graph, loops=loops)
+
+    def node_stamps_ns(self) -> dict[int, int]:
+        """Return the stamp of each node of the graph, nanoseconds."""
+        return {node.id: node.stamp_ns for node in self._odometry.nodes.values()}
+
+    def node_poses(self) -> tuple[list[int], Array]:
+        """Return stamps, nanoseconds, and T_map_sensor (N, 4, 4) of nodes joined to the first."""
+        part = self.graph.part(self.graph.nodes[0])
+        nodes = [node for node in self.graph.nodes if self.graph.part(node) == part]
+        stamps_ns = self.node_stamps_ns()
+        return [stamps_ns[node] for node in nodes], self.graph.poses(nodes)
+
+    def _add_node(self, node: Node, edge: Edge | None, prepared: PreparedScan,
+                  T_map_sensor: Array) -> None:
+        """Put a node into the graph, and let its candidates wait; an origin is put where it is."""
+        c = self.mapper_config
+        if edge is None:
+            self.graph.add_origin(node.id, T_map_sensor)
+        else:
+            self.graph.add_node(edge)
+            self.consistency.paths.add(edge)
+        if not self._closes_loops:
+            return
+        place = Surroundings(node, prepared, self.keyframes, self.graph, self.consistency.paths, c)
+        self.candidates.add(node.id, prepared, place.candidates(self._odometry.nodes), c.waiting)
+        if not place.is_covered():
+            self.keyframes.add(node.id, node.stamp_ns, node.track_id, prepared)
+
+    def _is_elsewhere(self, scan: SemanticScan) -> bool:
+        """Whether a scan that the tracker cannot place is at a place of the map, and far from it.
+
+        It has to be registered to two keyframes that agree with each other: a kidnapped sensor.
+        """
+        count = self.mapper_config.registrations_per_scan
+        if not self._closes_loops or not len(self.keyframes):
+            return False
+        prepared = preprocess(scan, self.tracker.config)
+        alike = self.keyframes.alike(prepared)[:count]
+        found = [Edge(target, NOWHERE, *seen, Kind.LOOP) for target in alike if (
+            seen := self._verification.one(Candidate(NOWHERE, prepared, target), self.keyframes,
+                                           self.tracker.config)) is not None]
+        if not any(self.consistency.agree(*pair) for pair in combinations(found, 2)):
+            return False
+        at = self.graph.pose(found[0].target) @ found[0].T_target_source
+        way = at[:3, 3] - self._odometry.last_pose(self.graph)[:3, 3]
+        return float(np.linalg.norm(way)) > self.mapper_config.loop_radius * prepared.scale
+
+    def _work(self, *, at_once: bool = False, wait: bool = False) -> list[Edge]:
+        """Register candidates, as many as there is time for; return the loops believed now."""
+        found = self._verification.work(
+            self.candidates, self.keyframes, self.tracker.config,
+            self.mapper_config.registrations_per_scan, at_once=at_once, wait=wait)
+        if self._verification.fault and self._closes_loops:
+            self._closes_loops = False
+            self._notes.append(self._verification.fault)
+        return self._offer(found) if found else []
+
+    def _offer(self, loops: list[Edge]) -> list[Edge]:
+        """Return the loops that are believed now, closed in the graph."""
+        if self.graph.missing:
+            return []
+        closed = [edge for loop in loops
+                  for edge in self.consistency.offer(loop, self.mapper_config)]
+        if closed:
+            self.graph.close(closed)
+        if self.consistency.in_question():
+            before = {id(edge) for edge in self.graph.loops}
+            kept = self.graph.without_outliers([*self.graph.loops,
+                                                *self.consistency.contradicting])
+            self.graph.replace_loops(kept)
+            self.consistency.begin_anew(self.graph.edges)
+            closed += [edge for edge in kept if id(edge) not in before]
+        return closed
+
+    def _loop_of(self, edge: Edge) -> Loop:
+        nodes = self._odometry.nodes
+        return Loop(nodes[edge.source].stamp_ns, nodes[edge.target].stamp_ns,
+                    edge.T_target_source, edge.covariance)
+
+    def _T_map_odom(self, tracked: TrackedScan) -> Array | None:
+        if tracked.T_odom_sensor is None:
+            return None
+        node = self._odometry.last(tracked.track_id)
+        return self.graph.pose(node.id) @ se3.inverse(node.T_odom_sensor)

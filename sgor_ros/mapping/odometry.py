@@ -1,0 +1,161 @@
+"""From tracked scans to nodes and odometry edges of the graph, and back to a pose of each scan."""
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core.common import se3
+from ..core.common.settings import InputError
+from ..tracker import TrackedScan
+from ..tracker import TrackerConfig
+from ..tracker.choice import UNKNOWN_COVARIANCE
+from .edge import Edge
+from .pose_graph import PoseGraph
+from .result import Trajectory
+
+Array = NDArray[np.float64]
+
+LEAST = np.diag([1e-3**2] * 3 + [1e-4**2] * 3)
+"""What no edge goes below, m^2 and rad^2: a covariance has to be one."""
+
+
+@dataclass(frozen=True, eq=False)
+class Node:
+    """A scan that is a node of the graph.
+
+    Attributes
+    ----------
+    id : int
+        The keyframe's id of the tracker.
+    stamp_ns : int
+    track_id : int
+    T_odom_sensor : (4, 4) float64
+    covariance : (6, 6) float64 or None
+        Of the pose since the start of the track, in the odom frame.
+    way : float
+        Metres driven since the first scan of all.
+    """
+
+    id: int
+    stamp_ns: int
+    track_id: int
+    T_odom_sensor: Array
+    covariance: Array | None
+    way: float
+
+
+class Odometry:
+    """Nodes out of the keyframes of the tracker, and all scans hung on them.
+
+    Attributes
+    ----------
+    nodes : dict of int to Node
+    """
+
+    def __init__(self) -> None:
+        self.nodes: dict[int, Node] = {}
+        self._last: dict[int, Node] = {}
+        self._stamps_ns: list[int] = []
+        self._anchors: list[int] = []
+        self._T_anchor_sensor: list[Array] = []
+        self._way = 0.0
+        self._before: tuple[int, Array] | None = None
+
+    def add(self, tracked: TrackedScan, config: TrackerConfig) -> tuple[Node, Edge | None] | None:
+        """Take the next scan that has a pose.
+
+        Returns
+        -------
+        (Node, Edge or None) or None
+            The node that it became and the edge from the node before; no edge where a track
+            begins. None where it only hangs on a node.
+        """
+        T, track = tracked.T_odom_sensor, tracked.track_id
+        assert T is not None
+        if self._before is not None and self._before[0] == track:
+            self._way += float(np.linalg.norm(T[:3, 3] - self._before[1][:3, 3]))
+        self._before = track, T
+        # in consecutive mode each scan is the reference of the next, and few become nodes
+        on = self.nodes.get(tracked.reference_id or 0) or self._last.get(track)
+        if tracked.keyframe_id is None or (
+                on is not None and config.mode == 'consecutive' and not _is_far(on, T, config)):
+            assert on is not None, 'a track begins with a keyframe'
+            self._hang(tracked.stamp_ns, on.id, se3.inverse(on.T_odom_sensor) @ T)
+            return None
+        node = Node(tracked.keyframe_id, tracked.stamp_ns, track, T, tracked.covariance, self._way)
+        self.nodes[node.id] = self._last[track] = node
+        self._hang(tracked.stamp_ns, node.id, np.eye(4))
+        return node, None if on is None else edge_between(on, node, (
+            tracked.reference_covariance if on.id == tracked.reference_id else None))
+
+    def last(self, track_id: int) -> Node:
+        """Return the newest node of a track."""
+        return self._last[track_id]
+
+    def last_pose(self, graph: PoseGraph) -> Array:
+        """Return T_map_sensor of the last scan that has a pose; the origin before the first."""
+        if not self._anchors:
+            return np.eye(4)
+        return graph.pose(self._anchors[-1]) @ self._T_anchor_sensor[-1]
+
+    def node_at(self, stamp_ns: int) -> int:
+        """Return the node of a stamp.
+
+        Raises
+        ------
+        InputError
+            There is none.
+        """
+        for node in self.nodes.values():
+            if node.stamp_ns == stamp_ns:
+                return node.id
+        raise InputError(f'stamp_ns = {stamp_ns}: that of no keyframe')
+
+    def _hang(self, stamp_ns: int, node: int, T_node_sensor: Array) -> None:
+        self._stamps_ns.append(stamp_ns)
+        self._anchors.append(node)
+        self._T_anchor_sensor.append(T_node_sensor)
+
+    def trajectory(self, graph: PoseGraph, *, loops: bool = True) -> Trajectory:
+        """Return the pose of each scan in the map, or by odometry alone."""
+        anchors, rows = np.unique(np.array(self._anchors, np.int64), return_inverse=True)
+        nodes = anchors.tolist()
+        poses = graph.poses(nodes) if loops else graph.poses_by_odometry(nodes)
+        T_anchor_sensor = np.array(self._T_anchor_sensor).reshape(-1, 4, 4)
+        return Trajectory(
+            np.array(self._stamps_ns, np.int64), poses[rows] @ T_anchor_sensor,
+            np.array([graph.part(node) for node in nodes], np.int64)[rows])
+
+
+def edge_between(target: Node, source: Node, step: Array | None = None) -> Edge:
+    """Return the odometry edge of two nodes of a track, the source being the later.
+
+    Its covariance is by how much that of the pose has grown between them. Errors that repeat from
+    step to step are in it with all that they add to those before, so that edges may be counted as
+    independent of each other. It never goes below `step`, (6, 6), that of the registration of one
+    to the other, where there was one: on a way back errors that repeat undo those before.
+    """
+    T = se3.inverse(target.T_odom_sensor) @ source.T_odom_sensor
+    if target.covariance is None or source.covariance is None:
+        covariance = UNKNOWN_COVARIANCE if step is None else step
+    else:
+        carry = se3.carried(source.T_odom_sensor[:3, 3] - target.T_odom_sensor[:3, 3])
+        back = se3.turned(target.T_odom_sensor[:3, :3].T)
+        growth = back @ (source.covariance - carry @ target.covariance @ carry.T) @ back.T
+        covariance = _at_least(growth, LEAST if step is None else step)
+    return Edge(target.id, source.id, T, covariance)
+
+
+def _at_least(covariance: Array, least: Array) -> Array:
+    """Return a (6, 6) covariance that is widened where it is below another."""
+    root = np.linalg.cholesky(least)
+    back = np.linalg.inv(root)
+    values, vectors = np.linalg.eigh(back @ (covariance + covariance.T) @ back.T / 2)
+    widened = root @ (vectors * np.maximum(values, 1.0)) @ vectors.T @ root.T
+    return np.asarray((widened + widened.T) / 2)
+
+
+def _is_far(node: Node, T_odom_sensor: Array, config: TrackerConfig) -> bool:
+    T = se3.inverse(node.T_odom_sensor) @ T_odom_sensor
+    return (float(np.linalg.norm(T[:3, 3])) > config.keyframe_distance
+            or se3.angle(T[:3, :3]) > config.keyframe_angle)
