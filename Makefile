@@ -20,8 +20,9 @@ lint: setup
 site: setup
 	$(PY) -m sphinx -q -W --keep-going docs out/site
 
+# two files at a time, the tests of one in their order
 test: lint
-	$(PY) -m pytest
+	$(PY) -m pytest -n 2 --dist loadfile --no-loadscope-reorder
 
 # for who changes a line: no real data, no processes, one or two places of each verdict
 test-fast: setup

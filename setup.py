@@ -76,7 +76,7 @@ setup(
         'slam': ['gtsam>=4.3', 'g2opy'],
         # --visualize; needs numpy 2, which the messages of an installed Jazzy do not take
         'visualize': ['rerun-sdk>=0.41'],
-        'test': ['pytest'],
+        'test': ['pytest', 'pytest-xdist'],
         # the site: python -m sphinx -W docs out/site
         'docs': ['sphinx>=8', 'numpydoc>=1.8', 'myst-parser>=4', 'furo'],
         'dev': [

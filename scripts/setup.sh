@@ -56,6 +56,12 @@ As root: apt-get install $*"
         --no-install-recommends "$@" >/dev/null
 }
 
+# uv takes a fifth of the time of pip; where it cannot be had or finds no index, pip does it
+install() {
+    VIRTUAL_ENV=$venv "$venv/bin/uv" pip install -q "$@" 2>/dev/null ||
+        "$venv/bin/python" -m pip install -qq --disable-pip-version-check "$@"
+}
+
 python=$(find_python)
 say "Python: $python"
 mapfile -t packages < <(missing_packages "$python")
@@ -74,12 +80,13 @@ fi
 
 say "making $venv (one to three minutes)"
 "$python" -m venv --clear "${options[@]}" "$venv"
-"$venv/bin/python" -m pip install -qq --disable-pip-version-check --editable ".[$extras]" \
-    "${pins[@]}"
-"$venv/bin/python" -m pip install -qq --disable-pip-version-check 'gtsam>=4.3' g2opy "${pins[@]}" ||
-    say 'no GTSAM or g2o for this machine: the tests of docs/pose_graph.md are skipped'
+"$venv/bin/python" -m pip install -qq --disable-pip-version-check uv ||
+    say 'no uv: pip takes some minutes more'
+install --editable ".[$extras]" "${pins[@]}"
+install 'gtsam>=4.3' g2opy "${pins[@]}" ||
+    say 'no GTSAM or g2o for this machine: loops are not closed, and their tests are skipped'
 if [ "${#pins[@]}" -eq 0 ]; then
-    "$venv/bin/python" -m pip install -qq --disable-pip-version-check --editable '.[visualize]' ||
+    install --editable '.[visualize]' ||
         say 'no rerun for this machine: the tests of --visualize are skipped'
     say 'building tf2_msgs for the tests of /tf (a minute)'
     bash scripts/tf2_msgs.sh "$venv/bin/python" "$venv/tf2_msgs" ||
