@@ -82,9 +82,11 @@ class Retrieval:
         self._rows[count] = descriptor
         self._ids.append(keyframe)
 
-    def alike(self, descriptor: Descriptor) -> list[int]:
-        """Return all keyframes, those that look most alike first."""
+    def alike(self, descriptor: Descriptor) -> dict[int, float]:
+        """Return all keyframes with their likeness, those that look most alike first."""
         if not self._ids:
-            return []
+            return {}
         likeness = self._rows[:len(self._ids)] @ descriptor
-        return [self._ids[row] for row in np.argsort(-likeness)]
+        order = np.argsort(-likeness)
+        return {self._ids[row]: found for row, found in zip(
+            order.tolist(), likeness[order].tolist(), strict=True)}

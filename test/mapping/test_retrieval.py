@@ -45,10 +45,12 @@ def test_the_most_alike_come_first_also_when_rows_have_grown():
     rows = rng.normal(size=(200, 30)).astype(np.float32)
     rows /= np.linalg.norm(rows, axis=1, keepdims=True)
     retrieval = Retrieval()
-    assert retrieval.alike(rows[0]) == []
+    assert retrieval.alike(rows[0]) == {}
     for i, row in enumerate(rows):
         retrieval.add(1000 + i, row)
-    order = retrieval.alike(rows[70] + 0.1 * rows[150])
+    alike = retrieval.alike(rows[70] + 0.1 * rows[150])
+    order = list(alike)
+    assert list(alike.values()) == sorted(alike.values(), reverse=True)
     assert order[0] == 1070
     assert sorted(order) == list(range(1000, 1200))
 
@@ -65,4 +67,4 @@ def test_a_kept_keyframe_registers_like_the_scan(street):
                                       scans[node].features.points)
     np.testing.assert_allclose(describe(keyframes.restored(0)), keyframes[0].descriptor,
                                atol=1e-6)
-    assert keyframes.alike(scans[2])[0] == 2
+    assert next(iter(keyframes.alike(scans[2]))) == 2
