@@ -3,7 +3,6 @@
 A place counts as found where two keyframes agree and none at another place does. So that the
 latter is known, what looks nearly as much alike at other places is tried too.
 """
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -14,12 +13,14 @@ from numpy.typing import NDArray
 from ...core.common import se3
 from ...core.common.settings import InputError
 from ...core.config import prepares_alike
+from ...core.config import SgorConfig
 from ...core.prepared_scan import as_scan
 from ...core.prepared_scan import PreparedScan
 from ...core.preprocessing import at_scale
 from ...core.preprocessing import preprocess
 from ...core.registration import register
 from ...core.registration import Scan
+from ...core.registration import with_few_keypoints
 from ...core.verdict.result import Status
 from ..edge import Edge
 from ..edge import Kind
@@ -29,8 +30,11 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-ATTEMPTS = 8
-"""Keyframes that are tried at most, besides those at other places."""
+QUICK, THOROUGH = 8, 3
+"""Keyframes that look alike and are tried at most: first by a quick attempt each, then, where no
+two agree, the first of them by all that `register` has."""
+NEIGHBOURS = 2
+"""Keyframes around an answer that are asked next whether they agree."""
 RIVALS = 2
 """Keyframes at other places that are tried before a place counts as found,"""
 AS_ALIKE = 0.8
@@ -85,7 +89,7 @@ class Located:
     alternatives : tuple of Place
         The other places; not empty only where it is AMBIGUOUS.
     attempts : int
-        Keyframes that it was registered to.
+        Registrations that were tried.
     edges : tuple of Edge
         From keyframes that answered to the scan, which is node -1.
     """
@@ -113,56 +117,112 @@ class Located:
 
 
 class Search:
-    """The answers of the keyframes that have been tried for one scan."""
+    """The answers of the keyframes that have been tried for one scan.
 
-    def __init__(self, known: 'Map', prepared: PreparedScan) -> None:
-        self.known = known
-        self.prepared = prepared
+    Attributes
+    ----------
+    answers : list of (Place, Edge)
+    unsure : list of (Status, Place)
+        Of registrations that leave several answers, or slide.
+    attempts : int
+    """
+
+    def __init__(self, known: 'Map', prepared: PreparedScan, hint: Array | None) -> None:
+        self.scale = prepared.scale
         self.answers: list[tuple[Place, Edge]] = []
         self.unsure: list[tuple[Status, Place]] = []
-        self.tried: set[int] = set()
+        self.attempts = 0
+        self._known = known
+        self._prepared = prepared
+        self._alike = known.keyframes.alike(prepared)
+        self._nodes = list(self._alike)
+        self._positions = known.poses(self._nodes)[:, :3, 3]
+        self._radius = known.mapper_config.loop_radius * self.scale
+        near = [] if hint is None else self._near(hint)[:HINTED]
+        self._order = list(dict.fromkeys([*near, *self._nodes]))
 
-    def attempt(self, node: int) -> None:
-        """Register the scan to a keyframe."""
-        self.tried.add(node)
-        target = self.known.keyframes.restored(node)
-        if not prepares_alike(target.config, self.known.config):
-            return
-        source = self.prepared
-        if source.scale != target.scale:
-            if source.scan is None:    # nothing to prepare again
-                return
-            source = at_scale(source, target.scale)
-        found = register(source, target, self.known.config)
-        if found.T_target_source is None:
-            return
-        T_map_target = self.known.poses([node])[0]
-        placements = [(found.T_target_source, found.covariance),
-                      *((other.T_target_source, other.covariance) for other in found.alternatives)]
-        for T, covariance in placements:
-            place = Place(T_map_target @ T, _turned(covariance, T_map_target), found.confidence,
-                          node)
-            if found.success and covariance is not None:
-                self.answers.append((place, Edge(node, NOBODY, T, covariance, Kind.LOOP)))
-            elif found.status in (Status.AMBIGUOUS, Status.DEGENERATE):
-                self.unsure.append((found.status, place))
+    def run(self) -> None:
+        """Try keyframes until two agree, and then those of other places."""
+        quick = with_few_keypoints(self._known.config).replace(unlabelled_attempt=False)
+        if self._round(quick, QUICK) or self._round(self._known.config, THOROUGH):
+            for node in self._elsewhere(self.found()[0]):
+                self._attempt(node, quick)
 
     def found(self) -> list[list[Place]]:
         """Return the places that keyframes answered, most agreed on first."""
-        scale, places = self.prepared.scale, [place for place, _ in self.answers]
         groups: list[list[Place]] = []
-        for place in sorted(places, key=lambda one: -one.confidence):
+        for place, _ in sorted(self.answers, key=lambda one: -one[0].confidence):
             for group in groups:
-                if _agree(group[0], place, scale):
+                if _agree(group[0], place, self.scale):
                     group.append(place)
                     break
             else:
                 groups.append([place])
         return sorted(groups, key=len, reverse=True)
 
+    def _round(self, config: SgorConfig, count: int) -> bool:
+        """Try what looks alike, and what is near an answer; return whether two agree."""
+        tried = {place.keyframe for place, _ in self.answers}
+        for node in self._order[:count]:
+            waiting = [node]
+            while waiting:
+                one = waiting.pop(0)
+                if one in tried:
+                    continue
+                tried.add(one)
+                place = self._attempt(one, config)
+                if place is None:
+                    continue
+                if len(self.found()[0]) > 1:
+                    return True
+                waiting = [near for near in self._near(place.T_map_sensor)
+                           if near not in tried][:NEIGHBOURS]
+        return False
+
+    def _attempt(self, node: int, config: SgorConfig) -> Place | None:
+        """Register the scan to a keyframe; return the answer, if it gave one."""
+        target, source = self._known.keyframes.restored(node), self._prepared
+        if not prepares_alike(target.config, config):
+            return None
+        if source.scale != target.scale:
+            if source.scan is None:    # nothing to prepare again
+                return None
+            source = at_scale(source, target.scale)
+        self.attempts += 1
+        found = register(source, target, config)
+        if found.T_target_source is None:
+            return None
+        T_map_target = self._known.nodes[node].T_map_sensor
+        placements = [(found.T_target_source, found.covariance),
+                      *((other.T_target_source, other.covariance) for other in found.alternatives)]
+        places = [Place(T_map_target @ T, _turned(covariance, T_map_target), found.confidence,
+                        node) for T, covariance in placements]
+        if found.success and found.covariance is not None:
+            edge = Edge(node, NOBODY, found.T_target_source, found.covariance, Kind.LOOP)
+            self.answers.append((places[0], edge))
+            return places[0]
+        if found.status in (Status.AMBIGUOUS, Status.DEGENERATE):
+            self.unsure += [(found.status, place) for place in places]
+        return None
+
+    def _near(self, T_map_sensor: Array) -> list[int]:
+        """Return the keyframes around a pose, nearest first."""
+        distance = np.linalg.norm(self._positions - T_map_sensor[:3, 3], axis=1)
+        return [self._nodes[row] for row in np.argsort(distance)[:HINTED + NEIGHBOURS]
+                if distance[row] < self._radius]
+
+    def _elsewhere(self, agreed: list[Place]) -> list[int]:
+        """Return keyframes at other places that look nearly as much alike and were not tried."""
+        far = np.linalg.norm(self._positions - agreed[0].T_map_sensor[:3, 3],
+                             axis=1) > self._radius
+        bound = AS_ALIKE * max(self._alike[place.keyframe] for place in agreed)
+        answered = {place.keyframe for place, _ in self.answers}
+        return [node for node, is_far in zip(self._nodes, far, strict=True)
+                if is_far and self._alike[node] >= bound and node not in answered][:RIVALS]
+
 
 def locate(known: 'Map', scan: Scan | ArrayLike, hint: ArrayLike | None = None) -> Located:
-    """Find where in a map a scan was taken: see `Map.locate`."""
+    """Find where in the map a scan was taken: see `Map.locate`."""
     given = as_scan(scan, 'scan')
     if isinstance(given, PreparedScan):
         given.check(known.config, 'scan')
@@ -172,47 +232,14 @@ def locate(known: 'Map', scan: Scan | ArrayLike, hint: ArrayLike | None = None) 
     expected = None if hint is None else _checked(hint)
     if not len(known.keyframes):
         return Located(Status.REFUSED, 'the map has no keyframes')
-    alike = known.keyframes.alike(prepared)
-    search = Search(known, prepared)
-    agreed: list[Place] = []
-    for node in _order(known, alike, expected, prepared.scale):
-        search.attempt(node)
-        agreed = next((group for group in search.found() if len(group) > 1), [])
-        if agreed:
-            break
-    if agreed:
-        for node in _rivals(search, alike, agreed):
-            search.attempt(node)
+    search = Search(known, prepared, expected)
+    search.run()
     return _judged(search)
-
-
-def _order(known: 'Map', alike: dict[int, float], hint: Array | None, scale: float
-           ) -> Iterator[int]:
-    """Yield keyframes to try: a few near a hint, and those that look most alike."""
-    order = list(alike)
-    if hint is not None:
-        distance = np.linalg.norm(known.poses(order)[:, :3, 3] - hint[:3, 3], axis=1)
-        near = [order[row] for row in np.argsort(distance)[:HINTED]
-                if distance[row] < known.mapper_config.loop_radius * scale]
-        order = list(dict.fromkeys([*near, *order]))
-    yield from order[:ATTEMPTS]
-
-
-def _rivals(search: Search, alike: dict[int, float], agreed: list[Place]) -> list[int]:
-    """Return keyframes at other places that look nearly as much alike."""
-    known, radius = search.known, search.known.mapper_config.loop_radius * search.prepared.scale
-    nodes = list(alike)
-    distance = np.linalg.norm(known.poses(nodes)[:, :3, 3] - agreed[0].T_map_sensor[:3, 3],
-                              axis=1)
-    bound = AS_ALIKE * max(alike[place.keyframe] for place in agreed)
-    elsewhere = [node for node, far in zip(nodes, distance > radius, strict=True)
-                 if far and alike[node] >= bound][:RIVALS]
-    return [node for node in elsewhere if node not in search.tried]
 
 
 def _judged(search: Search) -> Located:
     """Return what the answers come to."""
-    groups, attempts = search.found(), len(search.tried)
+    groups, attempts = search.found(), search.attempts
     edges = tuple(edge for _, edge in search.answers)
     if not groups:
         return _unsure(search, attempts)
@@ -223,8 +250,7 @@ def _judged(search: Search) -> Located:
         reason = f'{len(groups)} places of the map fit'
     elif len(best) == 1:
         status = Status.REFUSED
-        reason = (f'only one of {attempts} keyframes that look alike can be registered to, and '
-                  'none agrees with it')
+        reason = f'of {attempts} registrations one is right by itself, and none agrees with it'
     first = best[0]
     return Located(status, reason, first.T_map_sensor, first.covariance,
                    first.confidence / len(groups), first.keyframe,
@@ -234,12 +260,12 @@ def _judged(search: Search) -> Located:
 def _unsure(search: Search, attempts: int) -> Located:
     """Return the result where no keyframe was registered to."""
     if not search.unsure:
-        return Located(Status.REFUSED, f'none of {attempts} keyframes that look alike can be '
-                       'registered to', attempts=attempts)
+        return Located(Status.REFUSED, f'none of {attempts} registrations to keyframes that look '
+                       'alike succeeds', attempts=attempts)
     status, best = max(search.unsure, key=lambda one: one[1].confidence)
     others: list[Place] = []
     for _, place in search.unsure:
-        if not any(_agree(place, one, search.prepared.scale) for one in (best, *others)):
+        if not any(_agree(place, one, search.scale) for one in (best, *others)):
             others.append(place)
     if others:
         status, reason = Status.AMBIGUOUS, f'{len(others) + 1} places of the map fit'
