@@ -1,5 +1,6 @@
 """`Map`: nodes with poses, edges between them, and the scans of some: what a drive leaves."""
 from collections.abc import Iterable
+from collections.abc import Iterator
 from dataclasses import dataclass
 from dataclasses import field
 from pathlib import Path
@@ -9,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from numpy.typing import NDArray
 
+from ...core.compact_scan import CompactScan
 from ...core.config import SgorConfig
 from ...core.registration import Scan
 from ...tracker import TrackerConfig
@@ -128,6 +130,11 @@ class Map:
             The maps were made with settings that do not go together.
         """
         return merge(self, other)
+
+    def scans(self) -> Iterator[tuple[Array, CompactScan]]:
+        """Yield T_map_sensor and scan of each keyframe, for the cloud or the grid of the map."""
+        for keyframe in self.keyframes:
+            yield self.nodes[keyframe.id].T_map_sensor, keyframe.scan
 
     def poses(self, nodes: Iterable[int]) -> Array:
         """Return T_map_sensor of some nodes, (N, 4, 4)."""
