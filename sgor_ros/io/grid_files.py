@@ -4,8 +4,8 @@ from pathlib import Path
 import numpy as np
 
 from ..mapping.maps.occupancy import FREE
-from ..mapping.maps.occupancy import OCCUPIED
 from ..mapping.maps.occupancy import OccupancyGrid
+from ..mapping.maps.occupancy import OCCUPIED
 from .writing import new_file
 
 UNKNOWN_GREY, FREE_GREY, OCCUPIED_GREY = 205, 254, 0

@@ -174,7 +174,7 @@ def test_a_hint_that_is_no_pose_is_refused(hint):
 
 
 def test_a_scan_that_was_prepared_otherwise_is_refused():
-    with pytest.raises(InputError, match='scan: prepared with voxel_size = 0.4'):
+    with pytest.raises(InputError, match=r'scan: prepared with voxel_size = 0\.4'):
         known_map().locate(preprocess(scan_of(0), SgorConfig(voxel_size=0.4)))
 
 

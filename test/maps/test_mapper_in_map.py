@@ -108,5 +108,5 @@ def test_settings_are_those_of_the_map_or_go_with_it():
     assert Mapper(map=known).tracker.config.voxel_size == 0.4
     assert Mapper(SgorConfig(voxel_size=0.4, min_confidence=0.7), map=known
                   ).tracker.config.min_confidence == 0.7
-    with pytest.raises(InputError, match='config: voxel_size = 0.5, but the map'):
+    with pytest.raises(InputError, match=r'config: voxel_size = 0\.5, but the map'):
         Mapper(SgorConfig(voxel_size=0.5), map=known)

@@ -69,7 +69,7 @@ def test_the_merged_map_is_one_to_work_with(merged, tmp_path):
     merged.map.save(tmp_path / 'both')
     both = Map.load(tmp_path / 'both')
     assert both.sessions == (0, 1)
-    points, labels, T = return_drive()[THERE + TURN + 5]
+    points, _, T = return_drive()[THERE + TURN + 5]
     found = both.locate(points)
     assert found.success
     assert errors(found.T_map_sensor, relative(return_drive()[0][2], T))[0] < 0.1
@@ -96,5 +96,5 @@ def test_one_keyframe_in_common_is_not_enough(back):
 
 def test_maps_of_other_settings_are_refused(back):
     other = replace(back, config=SgorConfig(voxel_size=0.4))
-    with pytest.raises(InputError, match='other: voxel_size = 0.4, but this map'):
+    with pytest.raises(InputError, match=r'other: voxel_size = 0\.4, but this map'):
         known_map().merge(other)
