@@ -9,13 +9,14 @@ from ..mapping.maps.occupancy import OCCUPIED
 from .writing import new_file
 
 UNKNOWN_GREY, FREE_GREY, OCCUPIED_GREY = 205, 254, 0
+"""As map_saver writes them; with the thresholds below, 205 is just not free."""
 YAML = """image: {image}
 mode: trinary
 resolution: {resolution:g}
 origin: [{x:.6g}, {y:.6g}, 0]
 negate: 0
 occupied_thresh: 0.65
-free_thresh: 0.25
+free_thresh: 0.196
 """
 
 
