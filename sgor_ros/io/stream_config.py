@@ -26,7 +26,8 @@ class StreamConfig(Settings):
         '', 'Frame whose odometry is published, such as base_link; empty: the frame of the sensor')
     T_base_sensor: str = setting(
         '', 'Pose of the sensor in base_frame, x y z roll pitch yaw as in a URDF, m and rad; '
-        'empty: the node looks it up in tf2 at the stamp of each scan')
+        'empty: the node looks it up in tf2 at the stamp of each scan. It tells which way is up; '
+        'and where the sensor is in clouds that lie in base_frame already')
 
     def __post_init__(self) -> None:
         """Check the frames too."""

@@ -1,4 +1,5 @@
 """One scan as it comes in: points and labels (`SemanticScan`)."""
+from copy import copy
 from dataclasses import dataclass
 from typing import Any
 
@@ -70,6 +71,21 @@ class SemanticScan:
                            ORIGIN if origin is None else _vector(origin, 'origin'))
         object.__setattr__(self, 'up', None if up is None else _unit(_vector(up, 'up'), 'up'))
         object.__setattr__(self, 'rounding', _rounding(exact, clean))
+
+    def mounted(self, *, up: ArrayLike, origin: ArrayLike | None = None) -> 'SemanticScan':
+        """Return the same scan where the mount of the sensor is known; what it says itself stays.
+
+        Parameters
+        ----------
+        up, origin : (3,) array
+            As of the class.
+        """
+        known = copy(self)    # the same points
+        if self.up is None:
+            object.__setattr__(known, 'up', _unit(_vector(up, 'up'), 'up'))
+        if origin is not None and not self.origin.any():
+            object.__setattr__(known, 'origin', _vector(origin, 'origin'))
+        return known
 
     def seen_from_sensor(self, points: NDArray[Any]) -> NDArray[Any]:
         """Return (N, 3) points of its frame relative to the sensor, metres."""
