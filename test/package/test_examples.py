@@ -13,8 +13,8 @@ from sgor_ros.world import Lidar
 from sgor_ros.world import simulate
 
 EXAMPLES = Path(__file__).resolve().parents[2] / 'examples'
-TESTED = {'bag', 'label_convention', 'loops', 'maps', 'own_features', 'own_labels', 'pose_graph_g2o',
-          'pose_graph_gtsam', 'register_two_scans'}
+TESTED = {'bag', 'label_convention', 'loops', 'maps', 'own_features', 'own_labels',
+          'pose_graph_g2o', 'pose_graph_gtsam', 'register_two_scans'}
 
 
 def example(name):
