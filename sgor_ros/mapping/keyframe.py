@@ -97,9 +97,12 @@ class Keyframes:
         self._kept[keyframe.id] = keyframe
         self._retrieval.add(keyframe.id, keyframe.descriptor)
 
-    def alike(self, prepared: PreparedScan) -> dict[int, float]:
-        """Return those that look like a scan with their likeness, the most alike first."""
-        return self._retrieval.alike(describe(prepared))
+    def alike(self, prepared: PreparedScan, most: int | None = None) -> dict[int, float]:
+        """Return those that look like a scan with their likeness, the most alike first.
+
+        All of them, or so many.
+        """
+        return self._retrieval.alike(describe(prepared), most)
 
     def restored(self, node: int) -> PreparedScan:
         """Return the scan of a keyframe as `register` takes it."""

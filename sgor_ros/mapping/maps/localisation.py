@@ -33,6 +33,8 @@ Array = NDArray[np.float64]
 QUICK, THOROUGH = 8, 3
 """Keyframes that look alike and are tried at most: first by a quick attempt each, then, where no
 two agree, the first of them by all that `register` has."""
+MOST_ALIKE = 200
+"""Keyframes that are asked for; a long street has that many within `loop_radius` of a place."""
 NEIGHBOURS = 2
 """Keyframes around an answer that are asked next whether they agree."""
 RIVALS = 2
@@ -134,12 +136,10 @@ class Search:
         self.attempts = 0
         self._known = known
         self._prepared = prepared
-        self._alike = known.keyframes.alike(prepared)
-        self._nodes = list(self._alike)
-        self._positions = known.poses(self._nodes)[:, :3, 3]
+        self._alike = known.keyframes.alike(prepared, MOST_ALIKE)
         self._radius = known.mapper_config.loop_radius * self.scale
         near = [] if hint is None else self._near(hint)[:HINTED]
-        self._order = list(dict.fromkeys([*near, *self._nodes]))
+        self._order = list(dict.fromkeys([*near, *self._alike]))
 
     def run(self) -> None:
         """Try keyframes until two agree, and then those of other places."""
@@ -207,17 +207,19 @@ class Search:
 
     def _near(self, T_map_sensor: Array) -> list[int]:
         """Return the keyframes around a pose, nearest first."""
-        distance = np.linalg.norm(self._positions - T_map_sensor[:3, 3], axis=1)
-        return [self._nodes[row] for row in np.argsort(distance)[:HINTED + NEIGHBOURS]
-                if distance[row] < self._radius]
+        nodes, positions = self._known.positions
+        distance = np.linalg.norm(positions - T_map_sensor[:3, 3], axis=1)
+        rows = np.flatnonzero(distance < self._radius)
+        return [nodes[row] for row in rows[np.argsort(distance[rows])][:HINTED + NEIGHBOURS]]
 
     def _elsewhere(self, agreed: list[Place]) -> list[int]:
-        """Return keyframes at other places that look nearly as much alike and were not tried."""
-        far = np.linalg.norm(self._positions - agreed[0].T_map_sensor[:3, 3],
-                             axis=1) > self._radius
-        bound = AS_ALIKE * max(self._alike[place.keyframe] for place in agreed)
+        """Return keyframes at other places that look nearly as much alike and did not answer."""
+        nodes = list(self._alike)
+        way = self._known.poses(nodes)[:, :3, 3] - agreed[0].T_map_sensor[:3, 3]
+        far = np.linalg.norm(way, axis=1) > self._radius
+        bound = AS_ALIKE * max(self._alike.get(place.keyframe, 0.0) for place in agreed)
         answered = {place.keyframe for place, _ in self.answers}
-        return [node for node, is_far in zip(self._nodes, far, strict=True)
+        return [node for node, is_far in zip(nodes, far, strict=True)
                 if is_far and self._alike[node] >= bound and node not in answered][:RIVALS]
 
 

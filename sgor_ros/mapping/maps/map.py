@@ -3,6 +3,7 @@ from collections.abc import Iterable
 from collections.abc import Iterator
 from dataclasses import dataclass
 from dataclasses import field
+from functools import cached_property
 from pathlib import Path
 from typing import Self
 
@@ -135,6 +136,12 @@ class Map:
         """Yield T_map_sensor and scan of each keyframe, for the cloud or the grid of the map."""
         for keyframe in self.keyframes:
             yield self.nodes[keyframe.id].T_map_sensor, keyframe.scan
+
+    @cached_property
+    def positions(self) -> tuple[list[int], Array]:
+        """The keyframes, and their positions (K, 3) in the map, metres."""
+        nodes = [keyframe.id for keyframe in self.keyframes]
+        return nodes, self.poses(nodes)[:, :3, 3]
 
     def poses(self, nodes: Iterable[int]) -> Array:
         """Return T_map_sensor of some nodes, (N, 4, 4)."""
