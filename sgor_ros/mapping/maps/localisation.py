@@ -134,6 +134,7 @@ class Search:
         self.answers: list[tuple[Place, Edge]] = []
         self.unsure: list[tuple[Status, Place]] = []
         self.attempts = 0
+        self._tried: set[int] = set()
         self._known = known
         self._prepared = prepared
         self._alike = known.keyframes.alike(prepared, MOST_ALIKE)
@@ -189,6 +190,7 @@ class Search:
                 return None
             source = at_scale(source, target.scale)
         self.attempts += 1
+        self._tried.add(node)
         found = register(source, target, config)
         if found.T_target_source is None:
             return None
@@ -213,14 +215,14 @@ class Search:
         return [nodes[row] for row in rows[np.argsort(distance[rows])][:HINTED + NEIGHBOURS]]
 
     def _elsewhere(self, agreed: list[Place]) -> list[int]:
-        """Return keyframes at other places that look nearly as much alike and did not answer."""
+        """Return keyframes at other places that look nearly as much alike, but for those tried."""
         nodes = list(self._alike)
         way = self._known.poses(nodes)[:, :3, 3] - agreed[0].T_map_sensor[:3, 3]
         far = np.linalg.norm(way, axis=1) > self._radius
         bound = AS_ALIKE * max(self._alike.get(place.keyframe, 0.0) for place in agreed)
-        answered = {place.keyframe for place, _ in self.answers}
-        return [node for node, is_far in zip(nodes, far, strict=True)
-                if is_far and self._alike[node] >= bound and node not in answered][:RIVALS]
+        rivals = [node for node, is_far in zip(nodes, far, strict=True)
+                  if is_far and self._alike[node] >= bound][:RIVALS]
+        return [node for node in rivals if node not in self._tried]
 
 
 def locate(known: 'Map', scan: Scan | ArrayLike, hint: ArrayLike | None = None) -> Located:
