@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from return_drive import known_map
 from return_drive import mapped
+from return_drive import PERIOD_NS
 from return_drive import return_drive
 from return_drive import THERE
 from return_drive import TURN
@@ -21,6 +22,7 @@ from sgor_ros import SemanticScan
 from sgor_ros import SgorConfig
 from sgor_ros import Status
 from sgor_ros.core.common import se3
+from sgor_ros.mapping.edge import Edge
 from sgor_ros.mapping.keyframe import Keyframes
 
 pytest.importorskip('gtsam')
@@ -50,15 +52,25 @@ def shifted(known, T):
     return replace(known, nodes=nodes)
 
 
-def twice(known, T):
-    """Return a map with a second floor, that looks the same, at T_map_floor."""
+def twice(known, T, copied=None):
+    """Return a map with a second floor at T_map_floor, on which some nodes look the same.
+
+    Stairs lead there, of which little is known.
+    """
     offset = max(known.nodes) + 1
-    nodes = {**known.nodes, **{node.id + offset: replace(node, id=node.id + offset) for node in
-                               shifted(known, T).nodes.values()}}
+    copied = list(known.nodes) if copied is None else copied
+    nodes = {**known.nodes, **{node + offset: replace(shifted(known, T).nodes[node],
+                                                      id=node + offset) for node in copied}}
+    edges = [replace(edge, target=edge.target + offset, source=edge.source + offset)
+             for edge in known.edges if {edge.target, edge.source} <= set(copied)]
+    T_node = known.nodes[copied[0]].T_map_sensor
+    stairs = Edge(copied[0], copied[0] + offset, np.linalg.inv(T_node) @ T @ T_node,
+                  np.diag([25.0] * 3 + [0.1] * 3))
     keyframes = known.keyframes.copy()
     for one in known.keyframes:
-        keyframes.put(replace(one, id=one.id + offset))
-    return replace(known, nodes=nodes, keyframes=keyframes)
+        if one.id in copied:
+            keyframes.put(replace(one, id=one.id + offset))
+    return replace(known, nodes=nodes, edges=(*known.edges, *edges, stairs), keyframes=keyframes)
 
 
 @pytest.mark.parametrize('labels', [True, False])
@@ -136,10 +148,29 @@ def test_a_mapper_does_not_choose_between_floors_alike():
     mapper = Mapper(map=twice(known_map(), upstairs))
     points, labels, _ = return_drive()[BACK[1]]
     for i in range(2):
-        seen = mapper.track(SemanticScan(points, labels), i)
+        seen = mapper.track(SemanticScan(points, labels), i * PERIOD_NS)
         assert seen.success
         assert seen.T_map_odom is None
         assert seen.loops == ()
+
+
+def test_what_is_driven_decides_between_floors_alike():
+    """Upstairs is like the first metres; what comes after them is only down here."""
+    upstairs = np.eye(4)
+    upstairs[:3, 3] = 0, 0, 40
+    known = known_map()
+    mapper = Mapper(map=twice(known, upstairs, list(known.nodes)[:2]))
+    found = []
+    for i in range(THERE):
+        points, labels, _ = return_drive()[i]
+        seen = mapper.track(SemanticScan(points, labels), i * PERIOD_NS)
+        found.append(seen.T_map_odom is not None)
+        if found[-1]:
+            assert errors(seen.T_map_odom @ seen.T_odom_sensor, truth(i))[0] < 0.15
+    assert not found[0]
+    assert found[-1]
+    for i, T in enumerate(mapper.trajectory().T_map_sensor):
+        assert errors(T, truth(i))[0] < 0.15
 
 
 def test_one_keyframe_alone_is_not_enough():
