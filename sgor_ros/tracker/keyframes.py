@@ -84,6 +84,10 @@ class Keyframes:
         if all(one.id != keyframe.id for one in self._kept):
             self.add(keyframe, limit)
 
+    def renew(self, keyframe: Keyframe) -> None:
+        """Put a keyframe in place of the one of its number, where that is remembered."""
+        self._kept = [keyframe if one.id == keyframe.id else one for one in self._kept]
+
     def last(self, track_id: int) -> Keyframe | None:
         """Return the newest of a track."""
         return next((one for one in reversed(self._kept) if one.track_id == track_id), None)

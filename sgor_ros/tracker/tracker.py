@@ -21,6 +21,11 @@ from .choice import Step
 from .choice import UNKNOWN_COVARIANCE
 from .config import TrackerConfig
 from .covariance import PoseCovariance
+from .deskewing import by_expected_motion
+from .deskewing import by_step
+from .deskewing import is_skewed
+from .deskewing import LONGEST_STEP_S
+from .deskewing import Sweep
 from .keyframe_selection import is_keyframe
 from .keyframe_selection import is_new_place
 from .keyframe_selection import overlap
@@ -109,17 +114,23 @@ class Tracker:
 
     def _process(self, scan: SemanticScan, stamp_ns: int, warnings: list[str]) -> TrackedScan:
         """Find the pose of a scan that is on time."""
+        twist = self._sweep.twist if self._sweep else None
+        middle_s = None if scan.times is None else float(scan.times.mean())
+        scan, frame_covariance = by_expected_motion(scan, twist, self._motion, stamp_ns,
+                                                    self.tracker_config)
         prepared = preprocess(
             scan, self.config,
             scale_before=self._reference.prepared.scale if self._reference else None,
             up_before=self._up)
         self._up = prepared.ground.normal if prepared.ground else None
+        prepared = replace(prepared, frame_covariance=frame_covariance)
         new = ScanAtWork(prepared, stamp_ns, [*warnings, *prepared.warnings],
-                         dict(prepared.timings))
+                         dict(prepared.timings), middle_s=middle_s, deskewed_by=twist)
         if self._reference is None:
             return self._begin(new)
         step = self._predicted_step(new) or self._step(new, self._reference)
         if isinstance(step, Step):
+            step = self._deskewed_again(new, step)
             # in a new track each new place is a chance to find back to an old track
             new_place = is_new_place(step.T_reference_sensor, self._reference,
                                      self._last_keyframe(), self.tracker_config)
@@ -136,6 +147,7 @@ class Tracker:
         self._track_id = self._tracks
         self._failures = 0
         self._registered = False
+        self._sweep: Sweep | None = None    # the last one with a pose, of scans with times
 
     def _drop(self, stamp_ns: int) -> TrackedScan:
         self._late += 1
@@ -162,6 +174,7 @@ class Tracker:
         self._track_id = self._tracks
         self._failures = 0
         self._registered = False
+        self._sweep = None
         origin = PoseCovariance.origin()
         self._reference = self._keyframe(new, np.eye(4), origin)
         self._motion = Motion.unknown(new.stamp_ns, np.eye(4), np.zeros((6, 6)),
@@ -248,6 +261,31 @@ class Tracker:
             new.registration, new.reference = found, keyframe
         return step
 
+    def _deskewed_again(self, new: ScanAtWork, step: Step) -> Step:
+        """Register once more without the bend where nobody knew the motion before this step."""
+        reference = new.reference
+        assert reference is not None
+        seconds = (new.stamp_ns - reference.stamp_ns) * 1e-9
+        if not (is_skewed(new.prepared) and is_skewed(reference.prepared)
+                and reference is self._reference and step.covariance is not None
+                and 0 < seconds < LONGEST_STEP_S):
+            return step
+        bent, registration = new.prepared, new.registration
+        twist = se3.log(step.T_reference_sensor) / seconds
+        covariance = step.covariance / seconds**2
+        new.prepared = by_step(bent, twist, covariance)
+        again = self._step(new, replace(
+            reference, prepared=by_step(reference.prepared, twist, covariance)))
+        if isinstance(again, str):
+            new.prepared, new.registration, new.reference = bent, registration, reference
+            self._reference = reference
+            return step
+        new.deskewed_by = twist
+        self._sweep = Sweep.of(reference.track_id, reference.stamp_ns, reference.T_odom_sensor,
+                               twist, new.middle_s or 0.0)
+        self._keyframes.renew(self._reference)
+        return again
+
     def _relocalise(self, new: ScanAtWork, tries: int, *, earlier: bool = False) -> Step | None:
         """Try other keyframes, or those of earlier tracks; each scan a few, in turns."""
         assert self._reference is not None
@@ -270,6 +308,10 @@ class Tracker:
         self._reference, self._track_id, self._failures = keyframe, keyframe.track_id, 0
         self._registered = new.registration.success
         T_odom_sensor = keyframe.T_odom_sensor @ T
+        if new.middle_s is not None:
+            sweep = Sweep.of(self._track_id, new.stamp_ns, T_odom_sensor, new.deskewed_by,
+                             new.middle_s)
+            self._sweep = self._sweep.then(sweep) if self._sweep else sweep
         covariance = None
         if keyframe.covariance is not None and step.covariance is not None:
             covariance = keyframe.covariance.then(keyframe.T_odom_sensor, T, step.covariance,
