@@ -46,7 +46,8 @@ class Keyframe:
         if prepares_alike(self.prepared.config, config):
             return self
         scan = self.prepared.raw('the settings have changed')
-        return replace(self, prepared=preprocess(scan, config))
+        return replace(self, prepared=replace(
+            preprocess(scan, config), frame_covariance=self.prepared.frame_covariance))
 
     def distance(self, other: 'Keyframe') -> float:
         """Return the metres to another; infinite where it is in another frame."""
