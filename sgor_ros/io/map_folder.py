@@ -44,7 +44,9 @@ GRAPH: dict[str, tuple[type, tuple[int | str, ...]]] = {
     'covariances': (np.float64, ('E', 6, 6)), 'kinds': (np.uint8, ('E',))}
 KEYFRAMES: dict[str, tuple[type, tuple[int | str, ...]]] = {
     'nodes': (np.int64, ('K',)), 'track_ids': (np.int64, ('K',)),
-    'descriptors': (np.float32, ('K', 'D'))}
+    'descriptors': (np.float32, ('K', 'D')),
+    # of a scan that was not deskewed all zero
+    'frame_covariances': (np.float64, ('K', 6, 6))}
 README = """A map of sgor_ros: `sgor_ros.Map.load` reads it, `sgor_map show` draws it.
 
 map.json       version, settings that it was made with, size and CRC-32 of every file
@@ -132,7 +134,10 @@ def write_map(folder: str | Path, known: Map) -> None:
         (place / 'keyframes.npz').write_bytes(_npz({
             'nodes': np.array([one.id for one in known.keyframes], np.int64),
             'track_ids': np.array([one.track_id for one in known.keyframes], np.int64),
-            'descriptors': np.array([one.descriptor for one in known.keyframes], np.float32)}))
+            'descriptors': np.array([one.descriptor for one in known.keyframes], np.float32),
+            'frame_covariances': np.array([
+                np.zeros((6, 6)) if one.frame_covariance is None else one.frame_covariance
+                for one in known.keyframes])}))
         (place / 'README.txt').write_text(README)
         by_time = sorted(nodes, key=lambda node: (node.session, node.stamp_ns))
         write_tum(place / 'poses.tum', [node.stamp_ns for node in by_time],
@@ -179,13 +184,13 @@ def read_map(folder: str | Path) -> dict[str, Any]:
             raise InputError(f'{folder / "graph.npz"}: an edge of no node')
     kept = Keyframes()
     with readable(folder / 'keyframes.npz'):
-        for node, track_id, descriptor in zip(
+        for node, track_id, descriptor, frame in zip(
                 keyframes['nodes'].tolist(), keyframes['track_ids'].tolist(),
-                keyframes['descriptors'], strict=True):
+                keyframes['descriptors'], keyframes['frame_covariances'], strict=True):
             if node not in nodes or _name(node) not in files:
                 raise InputError(f'{folder / "keyframes.npz"}: node {node} has no scan or no pose')
             kept.put(Keyframe(node, nodes[node].stamp_ns, track_id, files[_name(node)],
-                              descriptor))
+                              descriptor, frame if frame.any() else None))
     return {'nodes': nodes, 'edges': edges, 'keyframes': kept, 'warnings': tuple(warnings),
             **settings}
 

@@ -7,6 +7,7 @@ from ..core.common.settings import Settings
 from .frames import parse_transform
 from .label_field import AUTO
 from .label_field import LABEL_FIELDS
+from .time_field import TIME_FIELDS
 
 
 @dataclass(frozen=True)
@@ -16,6 +17,10 @@ class StreamConfig(Settings):
     label_field: str = setting(
         AUTO, 'Field of the clouds that holds the class ids; auto: the first of '
         f'{", ".join(LABEL_FIELDS)} that a cloud has; none: work without labels')
+    time_field: str = setting(
+        AUTO, 'Field of the clouds with the time of each point, by which scans are deskewed; '
+        f'auto: the first of {", ".join(TIME_FIELDS)} that a cloud has; none: for clouds that are '
+        'deskewed already, or sensors at rest')
     odom_frame: str = setting(
         'odom', 'Frame of the published poses; its origin is the first scan')
     map_frame: str = setting(

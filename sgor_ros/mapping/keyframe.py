@@ -35,6 +35,8 @@ class Keyframe:
         Its scan, or what reads it from a file each time: see `scan`.
     descriptor : (D,) float32
         What it looks like: see `retrieval`.
+    frame_covariance : (6, 6) float64 or None
+        As of `PreparedScan`.
     """
 
     id: int
@@ -42,6 +44,7 @@ class Keyframe:
     track_id: int
     held: CompactScan | Callable[[], CompactScan]
     descriptor: Descriptor
+    frame_covariance: Array | None = None
 
     @property
     def scan(self) -> CompactScan:
@@ -89,12 +92,14 @@ class Keyframes:
         return sum(one.nbytes for one in self)
 
     def add(self, node: int, stamp_ns: int, track_id: int, prepared: PreparedScan) -> None:
-        """Keep a scan."""
-        self.put(Keyframe(node, stamp_ns, track_id, compact(prepared), describe(prepared)))
+        """Keep a scan; one of the same node gives way to it."""
+        self.put(Keyframe(node, stamp_ns, track_id, compact(prepared), describe(prepared),
+                          prepared.frame_covariance))
 
     def put(self, keyframe: Keyframe) -> None:
-        """Take one that is kept elsewhere too."""
+        """Take one that is kept elsewhere too; one of the same node gives way to it."""
         self._kept[keyframe.id] = keyframe
+        self._restored.pop(keyframe.id, None)
         self._retrieval.add(keyframe.id, keyframe.descriptor)
 
     def alike(self, prepared: PreparedScan, most: int | None = None) -> dict[int, float]:

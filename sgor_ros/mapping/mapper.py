@@ -116,6 +116,7 @@ class Mapper:
         if tracked.state in (State.FAILED, State.LOST) and self._is_elsewhere(scan):
             self.tracker.begin_track()
             self._notes.append('the sensor is at another place of the map: a new track begins')
+        self._keep_deskewed()
         keyframe = self.tracker.reference if tracked.keyframe else None
         return self.add(tracked, None if keyframe is None else keyframe.prepared)
 
@@ -227,6 +228,15 @@ class Mapper:
         self._found += self._offer(edges)
         if not self._is_in_map(node):
             self._notes.append(f'not found in the map: {found.reason}')
+
+    def _keep_deskewed(self) -> None:
+        """Keep a keyframe anew whose motion was known only when the next scan came."""
+        reference = self.tracker.reference
+        if reference is None or reference.id + self._odometry.first not in self.keyframes:
+            return
+        kept = self.keyframes[reference.id + self._odometry.first]
+        if kept.frame_covariance is not reference.prepared.frame_covariance:
+            self.keyframes.add(kept.id, kept.stamp_ns, kept.track_id, reference.prepared)
 
     def _is_elsewhere(self, scan: SemanticScan) -> bool:
         """Whether a scan that the tracker cannot place is at a place of the map, and far from it.

@@ -81,13 +81,19 @@ class Retrieval:
 
     def __init__(self) -> None:
         self._ids: list[int] = []
+        self._row: dict[int, int] = {}
         self._rows = np.empty((0, 0), np.float32)
         self._axes = np.empty((0, 0), np.float32)
         self._fitted = 0
         self._coarse = np.empty((0, AXES), np.float32)
 
     def add(self, keyframe: int, descriptor: Descriptor) -> None:
-        """Remember one more."""
+        """Remember one more, or another descriptor of one."""
+        row = self._row.setdefault(keyframe, len(self._ids))
+        if row < len(self._ids):
+            self._rows[row] = descriptor
+            self._coarse = self._coarse[:row]
+            return
         count = len(self._ids)
         if count == len(self._rows):
             self._rows = _grown(self._rows, count, len(descriptor))

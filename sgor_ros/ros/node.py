@@ -10,7 +10,7 @@ from sensor_msgs.msg import PointCloud2
 
 from ..core.common.settings import InputError
 from ..core.warmup import warm_up
-from ..io import messages
+from ..io.header_stamp import stamp_ns_of
 from ..io.sequence import ScanSequence
 from ..io.sequence import StampedScan
 from ..mapping import Map
@@ -59,7 +59,8 @@ class SgorNode(Node):
         self._pipeline = self._pipeline_of(self._config)
         self._at_work = threading.Lock()    # held while a scan changes the map
         self._requests = Services(self, self._config.odom_frame, self._save_map)
-        self._stream = CloudStream(self.resolve_topic_name('points'), self._config.label_field)
+        self._stream = CloudStream(self.resolve_topic_name('points'), self._config.label_field,
+                                   self._config.time_field)
         self._gaps = StampGaps()
         self._processed = self._failed = self._late = self._paused = 0
         self._log = ThrottledLog(self.get_logger())
@@ -126,7 +127,7 @@ class SgorNode(Node):
 
     def _receive(self, cloud: PointCloud2) -> None:
         self._heard_at = time.monotonic()
-        self._gaps.take(messages.stamp_ns_of(cloud.header))
+        self._gaps.take(stamp_ns_of(cloud.header))
         if self._requests.paused:
             self._paused += 1
         else:

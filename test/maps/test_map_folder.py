@@ -1,4 +1,5 @@
 """The folder of a map: what comes back, what is said of damage, and what a kill leaves."""
+from dataclasses import replace
 import json
 import os
 import random
@@ -55,6 +56,10 @@ def same(one, other):
         assert (keyframe.id, keyframe.stamp_ns, keyframe.track_id) == (
             its.id, its.stamp_ns, its.track_id)
         np.testing.assert_array_equal(keyframe.descriptor, its.descriptor)
+        if keyframe.frame_covariance is None:
+            assert its.frame_covariance is None
+        else:
+            np.testing.assert_array_equal(keyframe.frame_covariance, its.frame_covariance)
         have, found = keyframe.scan.as_arrays(), its.scan.as_arrays()
         assert have.keys() == found.keys()
         for name, array in have.items():
@@ -70,6 +75,15 @@ def test_what_is_saved_comes_back_bit_by_bit(saved, tmp_path):
     same(loaded, known_map())
     loaded.save(tmp_path / 'again')
     assert contents(tmp_path / 'again') == contents(saved)
+
+
+def test_what_is_not_known_of_a_deskewed_scan_is_kept(tmp_path):
+    known, keyframes = known_map(), known_map().keyframes.copy()
+    one = next(iter(keyframes))
+    keyframes.put(replace(one, frame_covariance=np.diag(np.arange(1.0, 7.0)) * 1e-4))
+    bent = replace(known, keyframes=keyframes)
+    bent.save(tmp_path / 'bent')
+    same(Map.load(tmp_path / 'bent'), bent)
 
 
 def test_it_is_small_and_people_and_others_can_read_it(saved):

@@ -22,6 +22,7 @@ from ...core.registration import register
 from ...core.registration import Scan
 from ...core.registration import with_few_keypoints
 from ...core.verdict.result import Status
+from ...tracker.deskewing import with_frames
 from ..edge import Edge
 from ..edge import Kind
 
@@ -195,13 +196,16 @@ class Search:
         if found.T_target_source is None:
             return None
         T_map_target = self._known.nodes[node].T_map_sensor
-        placements = [(found.T_target_source, found.covariance),
-                      *((other.T_target_source, other.covariance) for other in found.alternatives)]
+        frames = source.frame_covariance, self._known.keyframes[node].frame_covariance
+        placements = [(T, None if covariance is None else with_frames(covariance, T, *frames))
+                      for T, covariance in ((found.T_target_source, found.covariance), *(
+                          (other.T_target_source, other.covariance)
+                          for other in found.alternatives))]
         places = [Place(T_map_target @ T, _turned(covariance, T_map_target), found.confidence,
                         node) for T, covariance in placements]
-        if found.success and found.covariance is not None:
-            edge = Edge(node, NOBODY, found.T_target_source, found.covariance, Kind.LOOP)
-            self.answers.append((places[0], edge))
+        T, covariance = placements[0]
+        if found.success and covariance is not None:
+            self.answers.append((places[0], Edge(node, NOBODY, T, covariance, Kind.LOOP)))
             return places[0]
         if found.status in (Status.AMBIGUOUS, Status.DEGENERATE):
             self.unsure += [(found.status, place) for place in places]
