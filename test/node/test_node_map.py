@@ -11,8 +11,8 @@ import ros_helpers as ros
 from std_srvs.srv import Trigger
 
 from sgor_ros import Map
+from sgor_ros.io.header_stamp import stamp_ns_of
 from sgor_ros.io.messages import matrix_of
-from sgor_ros.io.messages import stamp_ns_of
 from sgor_ros.ros.playback.node_process import NodeProcess
 
 pytest.importorskip('gtsam')
