@@ -8,10 +8,10 @@ and out). `map_cloud` (the map as one cloud). `maps` (maps that stay).
 """
 from .config import MapperConfig
 from .mapper import Mapper
-from .maps.localisation import Located
-from .maps.localisation import Place
 from .maps.map import Map
 from .maps.merging import Merged
+from .maps.result import Located
+from .maps.result import Place
 from .result import Loop
 from .result import MappedScan
 from .result import Trajectory

@@ -143,17 +143,14 @@ class Mapper:
 
         Nodes of other parts, which nothing joins to it yet, are left out.
         """
-        known, nodes = self._known, self.graph.nodes
-        parts = ([self.graph.part(next(iter(known.nodes)))] if known.nodes else
-                 [self.graph.part(node) for node in nodes])
-        part = max(parts, key=parts.count, default=None)
-        chosen = [node for node in nodes if self.graph.part(node) == part]
+        known = self._known
+        chosen = self.graph.largest_part(next(iter(known.nodes), None))
         session = max(known.sessions, default=-1) + 1
         return Map(
             {node: MapNode(node, self._odometry.nodes[node].stamp_ns,
                            known.nodes[node].session if node in known.nodes else session, T.copy())
-             for node, T in zip(chosen, self.graph.poses(chosen), strict=True)},
-            tuple(edge for edge in self.graph.edges if self.graph.part(edge.source) == part),
+             for node, T in chosen.items()},
+            tuple(edge for edge in self.graph.edges if edge.source in chosen),
             self.keyframes.copy(chosen), self.tracker.config, self.tracker.tracker_config,
             self.mapper_config)
 

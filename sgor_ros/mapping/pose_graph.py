@@ -94,6 +94,12 @@ class PoseGraph:
         self._parent[self._row[node]] = row
         return row
 
+    def largest_part(self, of: int | None = None) -> dict[int, Array]:
+        """Return nodes with their poses: of the part with the most, or of that which one is in."""
+        parts = [self.part(node) for node in (self.nodes if of is None else [of])]
+        part = max(parts, key=parts.count, default=None)
+        return {node: self.pose(node) for node in self.nodes if self.part(node) == part}
+
     def add_origin(self, node: int, T_map_sensor: Array) -> None:
         """Begin a part of its own with a node at a pose."""
         self._append(node, T_map_sensor, len(self._row))

@@ -19,10 +19,10 @@ from ..config import MapperConfig
 from ..edge import Edge
 from ..keyframe import Keyframes
 from .localisation import locate
-from .localisation import Located
 from .merging import check_alike
 from .merging import merge
 from .merging import Merged
+from .result import Located
 
 Array = NDArray[np.float64]
 
