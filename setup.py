@@ -10,7 +10,8 @@ HERE = Path(__file__).resolve().parent
 PACKAGE = ElementTree.parse(HERE / 'package.xml').getroot()
 MAINTAINER = PACKAGE.find('maintainer')
 SHARE = 'share/sgor_ros'
-COMMANDS = ('replay', 'register', 'kitti_to_bag', 'benchmark', 'demo', 'warm_up', 'tables')
+COMMANDS = ('replay', 'register', 'map', 'kitti_to_bag', 'benchmark', 'demo', 'warm_up',
+            'tables')
 # the built-in world; the module of open3d without CUDA
 OPEN3D = ['open3d-cpu>=0.18']
 COMMANDS_NEED = [

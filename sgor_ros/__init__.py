@@ -5,6 +5,7 @@ Two scans: `register`, `preprocess`, `register_correspondences`, `warm_up`; with
 For keyframes that are kept: `compact`, `CompactScan`.
 Scan after scan: `Tracker`, `TrackerConfig`, `TrackedScan`, `State`.
 With loops and a map: `Mapper`, `MapperConfig`, `MappedScan`, `Loop`, `Trajectory`.
+Maps that stay: `Map`, `Located`, `Place`, `Merged`.
 Data sets: `open_drive`, `open_drives`, `Drive`.
 
 Importing it loads and changes nothing; compiled code is loaded with the first of these names.

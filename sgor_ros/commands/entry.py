@@ -33,6 +33,7 @@ def _entry(module: str) -> Callable[[], int]:
 benchmark = _entry('benchmark')
 demo = _entry('demo')
 kitti_to_bag = _entry('kitti_to_bag')
+map = _entry('map')
 register = _entry('register')
 replay = _entry('replay')
 tables = _entry('tables')

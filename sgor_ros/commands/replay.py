@@ -70,7 +70,7 @@ def replay(arguments: Namespace) -> int:
     if arguments.visualize is not None:
         visualize.check(arguments.visualize)
     with ExitStack() as stack:
-        sequence = _sequence(arguments, stream, stack)
+        sequence = open_sequence(arguments, stream, stack)
         start = PRESETS[arguments.preset]()
         if sequence.label_convention is not None:
             start = start.replace(label_convention=sequence.label_convention)
@@ -90,7 +90,7 @@ def replay(arguments: Namespace) -> int:
                 visualize.track_view(arguments.visualize, tracker.config)))
             pipeline = Pipeline(mapper or tracker, stream, BagSink(writer) if writer else None,
                                 mount)
-            rows, broken = _run(sequence, pipeline, view, warnings)
+            rows, broken = run_sequence(sequence, pipeline, view, warnings)
         summary = summary_of(rows, warnings.texts, arguments.bag_path, sequence.name, tracker,
                              stream)
         title = f'{arguments.bag_path.name} {sequence.name}'
@@ -110,7 +110,7 @@ def replay(arguments: Namespace) -> int:
     return OK
 
 
-def _sequence(arguments: Namespace, stream: StreamConfig, stack: ExitStack) -> ScanSequence:
+def open_sequence(arguments: Namespace, stream: StreamConfig, stack: ExitStack) -> ScanSequence:
     """Open the bag or the folder."""
     if is_bag(arguments.bag_path):
         bag = stack.enter_context(BagReader(arguments.bag_path))
@@ -123,8 +123,8 @@ def _sequence(arguments: Namespace, stream: StreamConfig, stack: ExitStack) -> S
     return drive if stream.label_field == AUTO else drive.without_labels()
 
 
-def _run(sequence: ScanSequence, pipeline: Pipeline, view: 'TrackView | None',
-         warnings: Warnings) -> tuple[list[Row], InputError | None]:
+def run_sequence(sequence: ScanSequence, pipeline: Pipeline, view: 'TrackView | None',
+                 warnings: Warnings) -> tuple[list[Row], InputError | None]:
     """Return a row for each scan, and what a bag broke off with, if there were scans before."""
     rows: list[Row] = []
     broken: InputError | None = None

@@ -167,14 +167,20 @@ def _attempts(config: SgorConfig, *, labelled: bool, level: bool) -> Iterator[Sg
         config.replace(context_weight=0.0),
         config.replace(context_weight=0.0, ground_check=False, height_gate=0.0))
     if 0 < config.quick_keypoints < config.max_correspondences:
-        for way in ways:
-            yield way.replace(max_correspondences=config.quick_keypoints,
-                              groups=min(config.groups, config.quick_groups),
-                              group_size=max(config.quick_keypoints // 8, config.group_keep + 1))
+        yield from map(with_few_keypoints, ways)
     yield ways[0]
     if config.unlabelled_attempt and less not in (config, *ways):    # or the same once more
         yield less
     yield from ways[1:]
+
+
+def with_few_keypoints(config: SgorConfig) -> SgorConfig:
+    """Return the settings of a quick attempt: of `register` alone, where one is to be enough."""
+    if not 0 < config.quick_keypoints < config.max_correspondences:
+        return config
+    return config.replace(max_correspondences=config.quick_keypoints,
+                          groups=min(config.groups, config.quick_groups),
+                          group_size=max(config.quick_keypoints // 8, config.group_keep + 1))
 
 
 def _attempt(source: PreparedScan, target: PreparedScan, config: SgorConfig, clock: Stopwatch

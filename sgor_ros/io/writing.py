@@ -1,11 +1,13 @@
 """How results get to the disk: written beside their place, moved there once they are complete.
 
 So whoever finds a result finds a whole one, whatever ended the run: a full disk, an error, a kill.
-Folders are never mixed into or replaced, as ROS users know it of `ros2 bag record`; a file is
-named by the user each time, and replaces the one before it.
+Folders are never mixed into or replaced, as ROS users know it of `ros2 bag record`, but for a map,
+which is saved again and again; a file is named by the user each time, and replaces the one before
+it.
 """
 from collections.abc import Iterator
 from contextlib import contextmanager
+import ctypes
 import fcntl
 from itertools import count
 import os
@@ -15,6 +17,8 @@ import shutil
 from ..core.common.settings import InputError
 
 UNFINISHED = '.unfinished'
+AT_FDCWD, RENAME_EXCHANGE = -100, 2
+"""Of renameat2, which Python has no name for."""
 
 
 @contextmanager
@@ -49,6 +53,65 @@ def new_folder(path: str | Path) -> Iterator[Path]:
     """
     path = Path(path)
     refuse_existing(path)
+    with _place_beside(path) as place:
+        yield place
+        place.rename(path)
+
+
+@contextmanager
+def replaced_folder(path: Path) -> Iterator[Path]:
+    """Yield where to make a folder that takes the place of `path` at the end of the ``with``.
+
+    As `new_folder`, but for one that is there, which is exchanged for the new one at once and then
+    cleared. Where the file system cannot exchange, the old one waits in the folder beside for as
+    long as nothing is at `path`, and the next run puts it back.
+
+    Raises
+    ------
+    InputError
+        `path` cannot be made, or is being written by another process.
+    """
+    path = path.resolve()    # a link stays, and what it leads to is replaced
+    with _place_beside(path) as place:
+        old = place.with_name(f'{path.name}.old')
+        if old.exists() and not path.exists():
+            old.rename(path)
+        yield place
+        _to_disk(place)
+        if not path.exists():
+            place.rename(path)
+        elif not _exchange(place, path):
+            path.rename(old)
+            try:
+                place.rename(path)
+            except OSError:
+                old.rename(path)
+                raise
+
+
+def _to_disk(folder: Path) -> None:
+    """Wait until a folder would outlive a loss of power."""
+    for path in (*folder.rglob('*'), folder):
+        handle = os.open(path, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
+
+
+def _exchange(one: Path, other: Path) -> bool:
+    """Exchange two folders in one step; return whether that was possible."""
+    try:
+        rename = ctypes.CDLL(None, use_errno=True).renameat2
+    except AttributeError:    # a C library without it
+        return False
+    return int(rename(AT_FDCWD, os.fsencode(one), AT_FDCWD, os.fsencode(other),
+                      RENAME_EXCHANGE)) == 0
+
+
+@contextmanager
+def _place_beside(path: Path) -> Iterator[Path]:
+    """Yield where a folder is made, in one of its own that is locked, and cleared at the end."""
     beside = _beside(path)
     try:
         beside.mkdir(parents=True, exist_ok=True)
@@ -62,7 +125,6 @@ def new_folder(path: str | Path) -> Iterator[Path]:
         shutil.rmtree(place, ignore_errors=True)
         try:
             yield place
-            place.rename(path)
         finally:
             shutil.rmtree(beside, ignore_errors=True)
     finally:

@@ -4,12 +4,17 @@
 `keyframe` (what is kept of a scan), `retrieval` (which look alike), `candidates` (which pairs to
 try and when), `verification` (they are registered), `loop_consistency` (which loops to believe, by
 `paths`: the surest way between two nodes), `pose_graph` (GTSAM), `edge` and `result` (what goes in
-and out). `map_cloud` (the map as one cloud).
+and out). `map_cloud` (the map as one cloud). `maps` (maps that stay).
 """
 from .config import MapperConfig
 from .mapper import Mapper
+from .maps.map import Map
+from .maps.merging import Merged
+from .maps.result import Located
+from .maps.result import Place
 from .result import Loop
 from .result import MappedScan
 from .result import Trajectory
 
-__all__ = ['Loop', 'MappedScan', 'Mapper', 'MapperConfig', 'Trajectory']
+__all__ = ['Located', 'Loop', 'Map', 'MappedScan', 'Mapper', 'MapperConfig', 'Merged', 'Place',
+           'Trajectory']

@@ -1,4 +1,6 @@
 """What is kept of a keyframe, and which are kept: those of space that none covers yet."""
+from collections.abc import Callable
+from collections.abc import Iterable
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -29,8 +31,8 @@ class Keyframe:
     stamp_ns : int
     track_id : int
         The track that it came in by.
-    scan : CompactScan
-        A few hundred kilobytes, for `register` when it is restored.
+    held : CompactScan or callable
+        Its scan, or what reads it from a file each time: see `scan`.
     descriptor : (D,) float32
         What it looks like: see `retrieval`.
     frame_covariance : (6, 6) float64 or None
@@ -40,9 +42,20 @@ class Keyframe:
     id: int
     stamp_ns: int
     track_id: int
-    scan: CompactScan
+    held: CompactScan | Callable[[], CompactScan]
     descriptor: Descriptor
     frame_covariance: Array | None = None
+
+    @property
+    def scan(self) -> CompactScan:
+        """A few hundred kilobytes, for `register` when it is restored."""
+        return self.held if isinstance(self.held, CompactScan) else self.held()
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of scan and descriptor in memory."""
+        scan = self.held.nbytes if isinstance(self.held, CompactScan) else 0
+        return scan + self.descriptor.nbytes
 
 
 class Keyframes:
@@ -65,22 +78,36 @@ class Keyframes:
     def __getitem__(self, node: int) -> Keyframe:
         return self._kept[node]
 
+    def copy(self, nodes: Iterable[int] | None = None) -> 'Keyframes':
+        """Return others of the same keyframes, or of those among some nodes."""
+        copied = Keyframes()
+        for node in self._kept if nodes is None else nodes:
+            if node in self._kept:
+                copied.put(self._kept[node])
+        return copied
+
     @property
     def nbytes(self) -> int:
-        """Bytes of scans and descriptors."""
-        return sum(one.scan.nbytes + one.descriptor.nbytes for one in self)
+        """Bytes of scans and descriptors in memory."""
+        return sum(one.nbytes for one in self)
 
     def add(self, node: int, stamp_ns: int, track_id: int, prepared: PreparedScan) -> None:
         """Keep a scan; one of the same node gives way to it."""
-        keyframe = Keyframe(node, stamp_ns, track_id, compact(prepared), describe(prepared),
-                            prepared.frame_covariance)
-        self._kept[node] = keyframe
-        self._restored.pop(node, None)
-        self._retrieval.add(node, keyframe.descriptor)
+        self.put(Keyframe(node, stamp_ns, track_id, compact(prepared), describe(prepared),
+                          prepared.frame_covariance))
 
-    def alike(self, prepared: PreparedScan) -> list[int]:
-        """Return those that look like a scan, the most alike first."""
-        return self._retrieval.alike(describe(prepared))
+    def put(self, keyframe: Keyframe) -> None:
+        """Take one that is kept elsewhere too; one of the same node gives way to it."""
+        self._kept[keyframe.id] = keyframe
+        self._restored.pop(keyframe.id, None)
+        self._retrieval.add(keyframe.id, keyframe.descriptor)
+
+    def alike(self, prepared: PreparedScan, most: int | None = None) -> dict[int, float]:
+        """Return those that look like a scan with their likeness, the most alike first.
+
+        All of them, or so many.
+        """
+        return self._retrieval.alike(describe(prepared), most)
 
     def restored(self, node: int) -> PreparedScan:
         """Return the scan of a keyframe as `register` takes it."""

@@ -1,7 +1,9 @@
 """The way of a scan through the mapper, on one screen."""
 from concurrent.futures import Executor
 from dataclasses import fields
+from dataclasses import replace
 from itertools import combinations
+import math
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,8 +23,9 @@ from .candidates import Surroundings
 from .config import MapperConfig
 from .edge import Edge
 from .edge import Kind
-from .keyframe import Keyframes
 from .loop_consistency import LoopConsistency
+from .maps.map import Map
+from .maps.map import MapNode
 from .odometry import Node
 from .odometry import Odometry
 from .pose_graph import PoseGraph
@@ -35,6 +38,8 @@ Array = NDArray[np.float64]
 
 NOWHERE = -1
 """In place of the node of a scan that has none."""
+FROM_A_MAP = 0
+"""In place of the track of nodes that were there before; those of the tracker count from 1."""
 
 
 class Mapper:
@@ -50,6 +55,14 @@ class Mapper:
     executor : concurrent.futures.Executor, optional
         Where candidates of loops are registered, in processes of its own; without it here, with
         each scan a few.
+    map : Map, optional
+        To go on in: the sensor is somewhere in it, or will come there. Poses are in its frame once
+        it is found. Settings that are not given are those of the map.
+
+    Raises
+    ------
+    InputError
+        The map was made with a configuration that does not go with this one.
 
     Attributes
     ----------
@@ -66,14 +79,25 @@ class Mapper:
     def __init__(self, config: SgorConfig | None = None,
                  tracker_config: TrackerConfig | None = None,
                  mapper_config: MapperConfig | None = None, *,
-                 executor: Executor | None = None) -> None:
+                 executor: Executor | None = None, map: Map | None = None) -> None:
+        known = Map() if map is None else map
+        if map is not None:
+            config, tracker_config, mapper_config = map.settings(config, tracker_config,
+                                                                 mapper_config)
         self.tracker = Tracker(config, tracker_config)
         self.mapper_config = MapperConfig.given(mapper_config)
         self.graph = PoseGraph()
-        self.keyframes = Keyframes()
+        self.graph.add_map({node.id: node.T_map_sensor for node in known.nodes.values()},
+                           known.edges)
+        self.keyframes = known.keyframes.copy()
         self.consistency = LoopConsistency()
+        self.consistency.begin_anew(known.edges)
         self.candidates = Candidates()
-        self._odometry = Odometry()
+        self._known = known
+        self._found: list[Edge] = []    # loops to it that are told of with this scan
+        self._odometry = Odometry(
+            Node(node.id, node.stamp_ns, FROM_A_MAP, node.T_map_sensor, None, -math.inf)
+            for node in known.nodes.values())
         self._verification = Verification(executor)
         self._closes_loops = bool(self.mapper_config.registrations_per_scan
                                   and not self.graph.missing)
@@ -105,12 +129,30 @@ class Mapper:
                 assert prepared is not None, 'a keyframe comes with its prepared scan'
                 self._add_node(*added, prepared, T_map_sensor)
         # where a track begins, its place in the map is what the scan is waited for
-        loops = self._work(at_once=tracked.restarted)
+        loops = [*self._found, *self._work(at_once=tracked.restarted)]
+        self._found = []
         notes, self._notes = self._notes, []
         told = {item.name: getattr(tracked, item.name) for item in fields(tracked)}
         return MappedScan(**{**told, 'warnings': (*tracked.warnings, *notes)},
                           loops=tuple(self._loop_of(edge) for edge in loops),
                           T_map_odom=self._T_map_odom(tracked))
+
+    @property
+    def map(self) -> Map:
+        """What there is so far: the largest part of the map, or what is joined to the one before.
+
+        Nodes of other parts, which nothing joins to it yet, are left out.
+        """
+        known = self._known
+        chosen = self.graph.largest_part(next(iter(known.nodes), None))
+        session = max(known.sessions, default=-1) + 1
+        return Map(
+            {node: MapNode(node, self._odometry.nodes[node].stamp_ns,
+                           known.nodes[node].session if node in known.nodes else session, T.copy())
+             for node, T in chosen.items()},
+            tuple(edge for edge in self.graph.edges if edge.source in chosen),
+            self.keyframes.copy(chosen), self.tracker.config, self.tracker.tracker_config,
+            self.mapper_config)
 
     def finish(self) -> tuple[Loop, ...]:
         """Work on all candidates that wait, however long it takes; return the loops closed."""
@@ -149,7 +191,10 @@ class Mapper:
 
     def _add_node(self, node: Node, edge: Edge | None, prepared: PreparedScan,
                   T_map_sensor: Array) -> None:
-        """Put a node into the graph, and let its candidates wait; an origin is put where it is."""
+        """Put a node into the graph, and let its candidates wait; an origin is put where it is.
+
+        As long as it is in no part of the map that was there before, it is looked for all over it.
+        """
         c = self.mapper_config
         if edge is None:
             self.graph.add_origin(node.id, T_map_sensor)
@@ -158,17 +203,35 @@ class Mapper:
             self.consistency.paths.add(edge)
         if not self._closes_loops:
             return
+        if not self._is_in_map(node.id):
+            self._look_for(node.id, prepared)
         place = Surroundings(node, prepared, self.keyframes, self.graph, self.consistency.paths, c)
-        self.candidates.add(node.id, prepared, place.candidates(self._odometry.nodes), c.waiting)
+        targets = place.candidates(self._odometry.nodes)
+        if not self._is_in_map(node.id):    # all of the map was asked already
+            targets = [target for target in targets if target not in self._known.nodes]
+        self.candidates.add(node.id, prepared, targets, c.waiting)
         if not place.is_covered():
             self.keyframes.add(node.id, node.stamp_ns, node.track_id, prepared)
+
+    def _look_for(self, node: int, prepared: PreparedScan) -> None:
+        """Look for a node all over the map that was there before.
+
+        Where several places of it fit, one loop to each waits for what the next nodes say.
+        """
+        found = self._known.locate(prepared)
+        places = {found.keyframe, *(place.keyframe for place in found.alternatives)}
+        edges = [replace(edge, source=node) for edge in found.edges
+                 if found.success or edge.target in places]
+        self._found += self._offer(edges)
+        if not self._is_in_map(node):
+            self._notes.append(f'not found in the map: {found.reason}')
 
     def _keep_deskewed(self) -> None:
         """Keep a keyframe anew whose motion was known only when the next scan came."""
         reference = self.tracker.reference
-        if reference is None or reference.id not in self.keyframes:
+        if reference is None or reference.id + self._odometry.first not in self.keyframes:
             return
-        kept = self.keyframes[reference.id]
+        kept = self.keyframes[reference.id + self._odometry.first]
         if kept.frame_covariance is not reference.prepared.frame_covariance:
             self.keyframes.add(kept.id, kept.stamp_ns, kept.track_id, reference.prepared)
 
@@ -181,7 +244,7 @@ class Mapper:
         if not self._closes_loops or not len(self.keyframes):
             return False
         prepared = preprocess(scan, self.tracker.config)
-        alike = self.keyframes.alike(prepared)[:count]
+        alike = list(self.keyframes.alike(prepared))[:count]
         found = [Edge(target, NOWHERE, *seen, Kind.LOOP) for target in alike if (
             seen := self._verification.one(Candidate(NOWHERE, prepared, target), self.keyframes,
                                            self.tracker.config)) is not None]
@@ -223,8 +286,15 @@ class Mapper:
         return Loop(nodes[edge.source].stamp_ns, nodes[edge.target].stamp_ns,
                     edge.T_target_source, edge.covariance)
 
+    def _is_in_map(self, node: int) -> bool:
+        """Whether a node is joined to the map that was there before; without one, all are."""
+        return not self._known.nodes or (
+            self.graph.part(node) == self.graph.part(next(iter(self._known.nodes))))
+
     def _T_map_odom(self, tracked: TrackedScan) -> Array | None:
         if tracked.T_odom_sensor is None:
             return None
         node = self._odometry.last(tracked.track_id)
+        if not self._is_in_map(node.id):
+            return None
         return self.graph.pose(node.id) @ se3.inverse(node.T_odom_sensor)

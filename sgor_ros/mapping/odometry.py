@@ -1,4 +1,5 @@
 """From tracked scans to nodes and odometry edges of the graph, and back to a pose of each scan."""
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,14 +27,15 @@ class Node:
     Attributes
     ----------
     id : int
-        The keyframe's id of the tracker.
+        The keyframe's id of the tracker, after those of a map that was there before.
     stamp_ns : int
     track_id : int
     T_odom_sensor : (4, 4) float64
     covariance : (6, 6) float64 or None
         Of the pose since the start of the track, in the odom frame.
     way : float
-        Metres driven since the first scan of all.
+        Metres driven since the first scan of all; minus infinity for those of a map that was there
+        before, which are no part of the drive.
     """
 
     id: int
@@ -47,13 +49,21 @@ class Node:
 class Odometry:
     """Nodes out of the keyframes of the tracker, and all scans hung on them.
 
+    Parameters
+    ----------
+    known : iterable of Node
+        Those of a map that was there before. Nodes of the tracker are numbered after them.
+
     Attributes
     ----------
     nodes : dict of int to Node
+    first : int
+        The lowest number that one of the tracker can have.
     """
 
-    def __init__(self) -> None:
-        self.nodes: dict[int, Node] = {}
+    def __init__(self, known: Iterable[Node] = ()) -> None:
+        self.nodes: dict[int, Node] = {node.id: node for node in known}
+        self.first = max(self.nodes, default=-1) + 1
         self._last: dict[int, Node] = {}
         self._stamps_ns: list[int] = []
         self._anchors: list[int] = []
@@ -76,17 +86,21 @@ class Odometry:
             self._way += float(np.linalg.norm(T[:3, 3] - self._before[1][:3, 3]))
         self._before = track, T
         # in consecutive mode each scan is the reference of the next, and few become nodes
-        on = self.nodes.get(tracked.reference_id or 0) or self._last.get(track)
+        reference = None if tracked.reference_id is None else tracked.reference_id + self.first
+        on = self._last.get(track)
+        if reference is not None:
+            on = self.nodes.get(reference, on)
         if tracked.keyframe_id is None or (
                 on is not None and config.mode == 'consecutive' and not _is_far(on, T, config)):
             assert on is not None, 'a track begins with a keyframe'
             self._hang(tracked.stamp_ns, on.id, se3.inverse(on.T_odom_sensor) @ T)
             return None
-        node = Node(tracked.keyframe_id, tracked.stamp_ns, track, T, tracked.covariance, self._way)
+        node = Node(tracked.keyframe_id + self.first, tracked.stamp_ns, track, T,
+                    tracked.covariance, self._way)
         self.nodes[node.id] = self._last[track] = node
         self._hang(tracked.stamp_ns, node.id, np.eye(4))
         return node, None if on is None else edge_between(on, node, (
-            tracked.reference_covariance if on.id == tracked.reference_id else None))
+            tracked.reference_covariance if on.id == reference else None))
 
     def last(self, track_id: int) -> Node:
         """Return the newest node of a track."""
@@ -106,7 +120,7 @@ class Odometry:
         InputError
             There is none.
         """
-        for node in self.nodes.values():
+        for node in reversed(self.nodes.values()):    # those of a map before come last
             if node.stamp_ns == stamp_ns:
                 return node.id
         raise InputError(f'stamp_ns = {stamp_ns}: that of no keyframe')

@@ -4,6 +4,7 @@ Errors of edges are as everywhere in this package, position and rotation each by
 target frame; GTSAM has rotation first, both in the frame of the source. See docs/pose_graph.md.
 """
 from collections.abc import Iterable
+from collections.abc import Mapping
 from collections.abc import Sequence
 from typing import Any
 
@@ -93,9 +94,25 @@ class PoseGraph:
         self._parent[self._row[node]] = row
         return row
 
+    def largest_part(self, of: int | None = None) -> dict[int, Array]:
+        """Return nodes with their poses: of the part with the most, or of that which one is in."""
+        parts = [self.part(node) for node in (self.nodes if of is None else [of])]
+        part = max(parts, key=parts.count, default=None)
+        return {node: self.pose(node) for node in self.nodes if self.part(node) == part}
+
     def add_origin(self, node: int, T_map_sensor: Array) -> None:
         """Begin a part of its own with a node at a pose."""
         self._append(node, T_map_sensor, len(self._row))
+
+    def add_map(self, poses: Mapping[int, Array], edges: Iterable[Edge]) -> None:
+        """Add nodes that were optimised before, (4, 4) each, with the edges that join them."""
+        for node, T_map_sensor in poses.items():
+            self._append(node, T_map_sensor, len(self._row))
+        for edge in edges:
+            parts = self.part(edge.source), self.part(edge.target)
+            self._parent[max(parts)] = min(parts)
+            self.edges.append(edge)
+            self._new_edges.append(edge)
 
     def add_node(self, edge: Edge) -> None:
         """Add the source of an edge, whose target is there already."""

@@ -43,7 +43,7 @@ class MappedScan(TrackedScan):
     T_map_odom : (4, 4) float64 or None
         Where the frame of the track lies in the map, by all loops so far: ``T_map_odom @
         T_odom_sensor`` is the corrected pose. It jumps where a loop is closed. None without a
-        pose.
+        pose, and with a map that was there before as long as the sensor is not found in it.
     """
 
     loops: tuple[Loop, ...] = ()

@@ -20,6 +20,13 @@ HEIGHTS_M = (1.0, 2.5, 5.0)
 """Borders between bands of height over the ground."""
 LABELS = 8
 """Channels of labels, of which several may share one."""
+FEW = 4000
+"""Up to so many keyframes all are compared; of more a shortlist,"""
+SHORTLIST = 500
+"""so long, by their coordinates along"""
+AXES = 64
+"""principal axes, which so many rows tell:"""
+SAMPLE = 4000
 
 
 def describe(prepared: PreparedScan) -> Descriptor:
@@ -66,28 +73,69 @@ def _unit(vector: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 class Retrieval:
-    """The descriptors of all keyframes, in rows of one matrix."""
+    """The descriptors of all keyframes, in rows of one matrix.
+
+    Where there are many, those to compare are found by their coordinates along the few axes in
+    which the rows differ most (principal component analysis), a twentieth of the work.
+    """
 
     def __init__(self) -> None:
         self._ids: list[int] = []
+        self._row: dict[int, int] = {}
         self._rows = np.empty((0, 0), np.float32)
+        self._axes = np.empty((0, 0), np.float32)
+        self._fitted = 0
+        self._coarse = np.empty((0, AXES), np.float32)
 
     def add(self, keyframe: int, descriptor: Descriptor) -> None:
         """Remember one more, or another descriptor of one."""
-        if keyframe in self._ids:
-            self._rows[self._ids.index(keyframe)] = descriptor
+        row = self._row.setdefault(keyframe, len(self._ids))
+        if row < len(self._ids):
+            self._rows[row] = descriptor
+            self._coarse = self._coarse[:row]
             return
         count = len(self._ids)
         if count == len(self._rows):
-            grown = np.empty((max(64, 2 * count), len(descriptor)), np.float32)
-            grown[:count] = self._rows[:count] if count else 0
-            self._rows = grown
+            self._rows = _grown(self._rows, count, len(descriptor))
         self._rows[count] = descriptor
         self._ids.append(keyframe)
 
-    def alike(self, descriptor: Descriptor) -> list[int]:
-        """Return all keyframes, those that look most alike first."""
-        if not self._ids:
-            return []
-        likeness = self._rows[:len(self._ids)] @ descriptor
-        return [self._ids[row] for row in np.argsort(-likeness)]
+    def alike(self, descriptor: Descriptor, most: int | None = None) -> dict[int, float]:
+        """Return keyframes with their likeness, those that look most alike first.
+
+        Parameters
+        ----------
+        descriptor : (D,) float32
+        most : int, optional
+            So many of them, found quickly; without it all are returned.
+        """
+        count = len(self._ids)
+        if not count:
+            return {}
+        if most is None or count <= FEW:
+            rows, likeness = np.arange(count), self._rows[:count] @ descriptor
+        else:
+            rows = self._shortlist(descriptor, max(most, SHORTLIST))
+            likeness = self._rows[rows] @ descriptor
+        order = np.argsort(-likeness)[:most]
+        return {self._ids[row]: found for row, found in zip(
+            rows[order].tolist(), likeness[order].tolist(), strict=True)}
+
+    def _shortlist(self, descriptor: Descriptor, most: int) -> NDArray[np.intp]:
+        """Return the rows that are nearest along the principal axes."""
+        count, done = len(self._ids), len(self._coarse)
+        if not len(self._axes) or count > 2 * self._fitted:
+            sample = self._rows[:count:-(-count // SAMPLE)].astype(np.float64)
+            self._axes = np.linalg.eigh(sample.T @ sample)[1][:, -AXES:].astype(np.float32)
+            self._fitted, done = count, 0
+        if done < count:
+            self._coarse = np.concatenate((self._coarse[:done],
+                                           self._rows[done:count] @ self._axes))
+        likeness = self._coarse @ (descriptor @ self._axes)
+        return np.argpartition(-likeness, most)[:most]
+
+
+def _grown(rows: NDArray[np.float32], count: int, width: int) -> NDArray[np.float32]:
+    grown = np.empty((max(64, 2 * count), width), np.float32)
+    grown[:count] = rows[:count] if count else 0
+    return grown

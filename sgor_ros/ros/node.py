@@ -1,5 +1,6 @@
 """`SgorNode`: clouds of a topic to the pipeline on a thread of its own, and its health told."""
 from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
 import threading
 import time
 from typing import Any
@@ -7,10 +8,12 @@ from typing import Any
 from rclpy.node import Node
 from sensor_msgs.msg import PointCloud2
 
+from ..core.common.settings import InputError
 from ..core.warmup import warm_up
 from ..io.header_stamp import stamp_ns_of
 from ..io.sequence import ScanSequence
 from ..io.sequence import StampedScan
+from ..mapping import Map
 from ..mapping import Mapper
 from ..pipeline import extrinsic
 from ..pipeline.loop_process import end
@@ -54,7 +57,8 @@ class SgorNode(Node):
         self._config = self._settings.node_config
         self._loops: ProcessPoolExecutor | None = None
         self._pipeline = self._pipeline_of(self._config)
-        self._requests = Services(self, self._config.odom_frame)
+        self._at_work = threading.Lock()    # held while a scan changes the map
+        self._requests = Services(self, self._config.odom_frame, self._save_map)
         self._stream = CloudStream(self.resolve_topic_name('points'), self._config.label_field,
                                    self._config.time_field)
         self._gaps = StampGaps()
@@ -76,9 +80,16 @@ class SgorNode(Node):
 
     def _tracker(self, config: NodeConfig) -> Tracker | Mapper:
         if not config.loop_closure:
+            if config.map_folder:
+                raise InputError('map_folder: needs loop_closure: true')
             return Tracker(*self._settings.live)
         self._loops = loop_process()
-        return Mapper(*self._settings.live, self._settings.mapper_config, executor=self._loops)
+        known = None
+        if config.map_folder and Path(config.map_folder).exists():
+            known = Map.load(config.map_folder)
+            self.get_logger().info(f'{config.map_folder}: {known}, to be found in')
+        return Mapper(*self._settings.live, self._settings.mapper_config, executor=self._loops,
+                      map=known)
 
     def start(self) -> None:
         """Begin to work; clouds are subscribed to once everything is compiled."""
@@ -152,7 +163,8 @@ class SgorNode(Node):
         """Apply what was asked for, run the pipeline, count and report what became of the scan."""
         self._log.info_once(scan.note)
         self._apply_requests()
-        outcome = self._pipeline.process(scan)
+        with self._at_work:
+            outcome = self._pipeline.process(scan)
         if not outcome.frame:
             self._log.warn_once('the clouds have no frame_id: set the parameter sensor_frame')
         tracked = outcome.tracked
@@ -166,6 +178,22 @@ class SgorNode(Node):
             **status.details(tracked), **status.map_details(self._pipeline.mapper),
             'seconds': f'{now - self._began_at:.4f}',
             'latency': f'{now - scan.arrived_ns * 1e-9:.4f}'})
+
+    def _save_map(self) -> str:
+        """Save the map as it is after the last scan; return what was saved, in words.
+
+        Raises
+        ------
+        InputError
+            There is no map, or nowhere to save it.
+        """
+        mapper, folder = self._pipeline.mapper, self._config.map_folder
+        if mapper is None or not folder:
+            raise InputError('the parameters loop_closure and map_folder are needed')
+        with self._at_work:
+            known = mapper.map
+        known.save(folder)
+        return f'{folder}: {known}'
 
     def _apply_requests(self) -> None:
         """Take over the parameters and what the services were asked for since the last scan."""

@@ -44,6 +44,10 @@ class NodeConfig(StreamConfig):
     loop_closure: bool = setting(
         False, 'Close loops: publish loop_closure, path and map_cloud, and with publish_tf the '
         'transform from map_frame to odom_frame; needs GTSAM')
+    map_folder: str = setting(
+        '', 'Where the service save_map writes the map; one that is there when the node starts is '
+        'gone on in: the sensor is looked for in it, and map_frame is its frame. Needs '
+        'loop_closure')
     publish_tf: bool = setting(
         False, 'Publish the transform from odom_frame to base_frame, or to the sensor frame, on '
         '/tf')

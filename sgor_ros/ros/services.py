@@ -1,4 +1,5 @@
-"""What others may ask of the node: the services reset, pause and resume, the topic set_pose."""
+"""What others may ask: the services reset, pause, resume and save_map, the topic set_pose."""
+from collections.abc import Callable
 import threading
 
 from geometry_msgs.msg import PoseWithCovarianceStamped
@@ -7,6 +8,7 @@ from numpy.typing import NDArray
 from rclpy.node import Node
 from std_srvs.srv import Trigger
 
+from ..core.common.settings import InputError
 from ..io.frames import frame_id
 from ..io.messages import matrix_of
 
@@ -23,7 +25,7 @@ class Services:
     paused : bool
     """
 
-    def __init__(self, node: Node, odom_frame: str) -> None:
+    def __init__(self, node: Node, odom_frame: str, save_map: Callable[[], str]) -> None:
         self._log = node.get_logger()
         self._odom_frame = odom_frame
         self._lock = threading.Lock()
@@ -33,6 +35,8 @@ class Services:
         node.create_service(Trigger, 'reset', self._on_reset)
         node.create_service(Trigger, 'pause', self._on_pause)
         node.create_service(Trigger, 'resume', self._on_resume)
+        self._save_map = save_map
+        node.create_service(Trigger, 'save_map', self._on_save_map)
         node.create_subscription(PoseWithCovarianceStamped, 'set_pose', self._on_set_pose, 1)
 
     def take(self) -> tuple[bool, tuple[Array, Array] | None]:
@@ -62,6 +66,13 @@ class Services:
     def _on_resume(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         self.paused = False
         return _done(response, 'the next scan goes on from the last one before the pause')
+
+    def _on_save_map(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        try:
+            return _done(response, self._save_map())
+        except (InputError, OSError) as error:
+            response.success, response.message = False, str(error)
+            return response
 
     def _on_set_pose(self, message: PoseWithCovarianceStamped) -> None:
         """Begin a new track there with the next scan."""

@@ -18,9 +18,11 @@ from sgor_ros.commands.command_line import run
 
 MODULES = {'sgor_register': 'commands.register', 'sgor_replay': 'commands.replay',
            'sgor_kitti_to_bag': 'commands.kitti_to_bag', 'sgor_benchmark': 'commands.benchmark',
-           'sgor_demo': 'commands.demo', 'sgor_tables': 'commands.tables', 'sgor_node': 'ros.main'}
+           'sgor_map': 'commands.map', 'sgor_demo': 'commands.demo',
+           'sgor_tables': 'commands.tables', 'sgor_node': 'ros.main'}
 COMMANDS = [(name,) for name in MODULES if name != 'sgor_node'] + [
-    ('sgor_benchmark', kind) for kind in ('pairs', 'wrong', 'ablation', 'sequence', 'solver')]
+    ('sgor_benchmark', kind) for kind in ('pairs', 'wrong', 'ablation', 'sequence', 'solver')] + [
+    ('sgor_map', kind) for kind in ('build', 'locate', 'merge', 'export', 'show')]
 WITHOUT_ROS = 'import sys; sys.modules["rclpy"] = None; from sgor_ros.{} import main; ' \
     'sys.exit(main())'
 

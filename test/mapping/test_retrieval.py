@@ -7,6 +7,7 @@ from sgor_ros import SemanticScan
 from sgor_ros.core.common import se3
 from sgor_ros.mapping.keyframe import Keyframes
 from sgor_ros.mapping.retrieval import describe
+from sgor_ros.mapping.retrieval import FEW
 from sgor_ros.mapping.retrieval import Retrieval
 
 
@@ -45,12 +46,36 @@ def test_the_most_alike_come_first_also_when_rows_have_grown():
     rows = rng.normal(size=(200, 30)).astype(np.float32)
     rows /= np.linalg.norm(rows, axis=1, keepdims=True)
     retrieval = Retrieval()
-    assert retrieval.alike(rows[0]) == []
+    assert retrieval.alike(rows[0]) == {}
     for i, row in enumerate(rows):
         retrieval.add(1000 + i, row)
-    order = retrieval.alike(rows[70] + 0.1 * rows[150])
+    alike = retrieval.alike(rows[70] + 0.1 * rows[150])
+    order = list(alike)
+    assert list(alike.values()) == sorted(alike.values(), reverse=True)
     assert order[0] == 1070
     assert sorted(order) == list(range(1000, 1200))
+
+
+def test_of_many_the_same_are_found_by_a_shortlist(descriptors):
+    """Mixtures of real descriptors; also of rows that came after the axes."""
+    rng = np.random.default_rng(0)
+    share = rng.uniform(0, 1, (6000, len(descriptors))) ** 4
+    noise = rng.normal(0, 0.3, (6000, descriptors.shape[1]))
+    rows = (share @ descriptors * np.exp(noise)).astype(np.float32)
+    rows /= np.linalg.norm(rows, axis=1, keepdims=True)
+    retrieval = Retrieval()
+    for i, row in enumerate(rows):
+        retrieval.add(i, row)
+        if i == FEW:
+            retrieval.alike(row, 10)
+    for i in (3, 2000, 5999):
+        asked = rows[i] + 0.3 * rows[i - 1]
+        all_of_them, few = retrieval.alike(asked), retrieval.alike(asked, 20)
+        assert len(all_of_them) == 6000
+        assert len(few) == 20
+        assert next(iter(few)) == next(iter(all_of_them)) == i
+        assert len(set(few) & set(list(all_of_them)[:20])) >= 15
+        assert few[i] == pytest.approx(all_of_them[i], abs=1e-6)
 
 
 def test_a_kept_keyframe_registers_like_the_scan(street):
@@ -65,4 +90,4 @@ def test_a_kept_keyframe_registers_like_the_scan(street):
                                       scans[node].features.points)
     np.testing.assert_allclose(describe(keyframes.restored(0)), keyframes[0].descriptor,
                                atol=1e-6)
-    assert keyframes.alike(scans[2])[0] == 2
+    assert next(iter(keyframes.alike(scans[2]))) == 2

@@ -9,11 +9,12 @@ from conftest import relative
 import numpy as np
 import pytest
 
+from sgor_ros.world import Lidar
 from sgor_ros.world import simulate
 
 EXAMPLES = Path(__file__).resolve().parents[2] / 'examples'
-TESTED = {'bag', 'label_convention', 'loops', 'own_features', 'own_labels', 'pose_graph_g2o',
-          'pose_graph_gtsam', 'register_two_scans'}
+TESTED = {'bag', 'label_convention', 'loops', 'maps', 'own_features', 'own_labels',
+          'pose_graph_g2o', 'pose_graph_gtsam', 'register_two_scans'}
 
 
 def example(name):
@@ -103,3 +104,18 @@ def test_loops_are_closed_on_the_way_back(capsys):
     assert len(printed) == len(mapper.graph.loops) + 1 > 6
     # turned round in the other lane, 2.6 m to the left of where it began
     np.testing.assert_allclose(mapper.trajectory().T_map_sensor[-1, :3, 3], [0, 2.6, 0], atol=0.1)
+
+
+def test_a_map_stays_and_is_gone_on_in(tmp_path, capsys):
+    pytest.importorskip('gtsam')
+    known = example('maps').main(tmp_path)
+    printed = capsys.readouterr().out.splitlines()
+    poses = [pose for *_, pose in simulate(16, lidar=Lidar(beams=32, columns=900), speed=25.0)]
+    found, *ways, merged = printed
+    assert 'registered' in found
+    assert len(ways) == len(poses) - 5
+    true = relative(poses[0], poses[-1])[:3, 3]
+    np.testing.assert_allclose(np.array(ways[-1].split('[')[1].strip(']').split(), float), true,
+                               atol=0.15)
+    assert known.sessions == (0, 1)
+    assert '2 sessions' in merged

@@ -153,8 +153,8 @@ def test_arrays_need_numpy_scipy_and_numba_only(bare, tmp_path):
     assert outside(bare, tmp_path, bare.with_name('sgor_warm_up')) == 'compiled\n'
 
 
-@pytest.mark.parametrize('command', ['register', 'replay', 'kitti_to_bag', 'benchmark', 'tables',
-                                     'demo'])
+@pytest.mark.parametrize('command', ['register', 'replay', 'map', 'kitti_to_bag', 'benchmark',
+                                     'tables', 'demo'])
 def test_a_command_without_its_packages_says_what_to_install(bare, tmp_path, command):
     done = subprocess.run([str(bare.with_name(f'sgor_{command}')), '--help'], cwd=tmp_path,
                           capture_output=True, text=True, check=False)
