@@ -25,6 +25,7 @@ from ..io.plots import plot_registration
 from ..io.scans import read_scan
 from ..io.writing import check_file
 from ..io.writing import new_file
+from ..io.writing import STDOUT
 from .command_line import FAILED
 from .command_line import OK
 from .command_line import Parser
@@ -63,10 +64,14 @@ def register_files(arguments: Namespace) -> int:
         **result.timings, 'preprocessing': preprocessing + result.timings['preprocessing']})
     for warning in result.warnings:
         print(f'warning: {warning}', file=sys.stderr)
-    print(_text(result))
-    if arguments.json:
+    document = json.dumps(_as_dict(result, arguments), indent=2) + '\n'
+    to_stdout = arguments.json == STDOUT
+    print(_text(result), file=sys.stderr if to_stdout else sys.stdout)
+    if to_stdout:
+        sys.stdout.write(document)
+    elif arguments.json:
         with new_file(arguments.json) as place:
-            place.write_text(json.dumps(_as_dict(result, arguments), indent=2) + '\n')
+            place.write_text(document)
     if arguments.plot:
         _plot(arguments, source, target, result)
     if arguments.visualize is not None:
@@ -91,7 +96,7 @@ def _parser() -> Parser:
                          help='where the labels of the target mean something else')
     add_preset(command)
     command.add_argument('--json', type=Path, metavar='FILE', help='write the result to; an older '
-                         'file is replaced')
+                         'file is replaced; -: to standard output, and all else to stderr')
     command.add_argument('--plot', type=Path, metavar='FILE', help='draw the result to '
                          f'({", ".join(PICTURES)}), likewise')
     add_visualize(command)
@@ -107,7 +112,7 @@ def _check_outputs(arguments: Namespace) -> None:
               if path is not None]
     for option, path, endings in (('--json', arguments.json, ()),
                                   ('--plot', arguments.plot, PICTURES)):
-        if path is None:
+        if path is None or (option == '--json' and path == STDOUT):
             continue
         check_file(path, option, endings)
         if path.resolve() in inputs:

@@ -16,6 +16,9 @@ from ..core.common.settings import InputError
 
 UNFINISHED = '.unfinished'
 
+STDOUT = Path('-')
+"""As other commands call it; where that is not meant, no file gets this name."""
+
 
 @contextmanager
 def new_file(path: str | Path) -> Iterator[Path]:
@@ -77,6 +80,8 @@ def free_folder(path: Path) -> Path:
 
 def refuse_existing(path: Path) -> None:
     """Raise InputError where `path` is there: nothing is mixed into it."""
+    if path == STDOUT:
+        raise InputError('-: a folder is written, which standard output cannot take')
     if os.path.lexists(path):
         raise InputError(f'{path}: exists already, and is neither replaced nor added to')
 
@@ -94,6 +99,8 @@ def check_file(path: Path, what: str, endings: tuple[str, ...] = ()) -> None:
     """
     if endings and path.suffix.lower() not in endings:
         raise InputError(f'{what} {path}: expected a name ending in {", ".join(endings)}')
+    if path == STDOUT:
+        raise InputError(f'{what} -: standard output is not possible here')
     if not path.parent.is_dir():
         raise InputError(f'{what} {path}: no folder {path.parent}')
     if path.is_dir():

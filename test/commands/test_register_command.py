@@ -40,6 +40,16 @@ def test_result_on_screen_in_json_and_as_picture(pair, tmp_path, capsys):
     assert (tmp_path / 'r.png').read_bytes().startswith(b'\x89PNG')
 
 
+def test_json_to_standard_output_is_nothing_but_json(pair, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main([*pair[:2], '--json', '-']) == 0
+    said = capsys.readouterr()
+    assert json.loads(said.out)['success']
+    assert 'T_target_source' in said.err
+    assert list(tmp_path.iterdir()) == [], 'no file of the name -'
+    assert main([*pair[:2], '--plot', '-']) == 2
+
+
 def test_the_time_is_that_of_the_whole_work(pair, tmp_path, capsys):
     begin = time.perf_counter()
     assert main([*pair[:2], '--json', str(tmp_path / 'r.json')]) == 0

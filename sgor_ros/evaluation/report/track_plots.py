@@ -68,7 +68,7 @@ def plot_track(path: str | Path, title: str, stamps_s: Sequence[float],
     above, upper = figure.add_subplot(grid[:, 0]), figure.add_subplot(grid[0, 1])
     lower = figure.add_subplot(grid[1, 1], sharex=upper)
     figure.suptitle(title, x=0.02, ha='left', weight='bold')
-    known = np.flatnonzero([T is not None for T in poses])
+    known = [i for i, T in enumerate(poses) if T is not None]
     length_m, several = 0.0, list(dict.fromkeys(tracks[i] for i in known))
     for number, track in enumerate(several):
         scans = np.array([i for i in known if tracks[i] == track])
