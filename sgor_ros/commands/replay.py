@@ -84,6 +84,8 @@ def replay(arguments: Namespace) -> int:
         place = stack.enter_context(new_folder(output))
         place.mkdir()
         warnings = Warnings()
+        for text in sequence.warnings:
+            warnings.add(text)
         with BagWriter(place / 'bag') if arguments.bag else nullcontext() as writer:
             warm_up(tracker.config)
             view = (None if arguments.visualize is None else stack.enter_context(

@@ -48,6 +48,7 @@ class BagSequence:
         How many clouds the bag claims to have.
     label_convention : None
         No bag tells.
+    warnings : tuple of str
 
     Raises
     ------
@@ -59,6 +60,7 @@ class BagSequence:
         self.name = topic
         self.expected = bag.count(topic)
         self.label_convention = None
+        self.warnings: tuple[str, ...] = ()
         self._bag = bag
         self._label_field = label_field
 
