@@ -67,11 +67,12 @@ class SgorNode(Node):
         refuse_unknown_overrides(self, override_names(self))
 
     def _pipeline_of(self, config: NodeConfig) -> Pipeline:
-        sink = TopicSink(self, config.publish_tf, config.loop_closure)
+        self._sink = TopicSink(self, config.publish_tf, config.loop_closure)
         mount = extrinsic.configured(config)
         if mount is None and config.base_frame:
             mount = tf2_extrinsic(self, config.base_frame)
-        return Pipeline(self._tracker(config), config, sink, mount, inverted_tf=config.invert_tf)
+        return Pipeline(self._tracker(config), config, self._sink, mount,
+                        inverted_tf=config.invert_tf)
 
     def _tracker(self, config: NodeConfig) -> Tracker | Mapper:
         if not config.loop_closure:
@@ -154,6 +155,9 @@ class SgorNode(Node):
         outcome = self._pipeline.process(scan)
         if not outcome.frame:
             self._log.warn_once('the clouds have no frame_id: set the parameter sensor_frame')
+        if self._sink.unacknowledged_edges:
+            self._log.warn_once('a subscriber of the edges does not keep up: it may miss some; '
+                                '/diagnostics counts them (edges unacknowledged)')
         tracked = outcome.tracked
         late = tracked is not None and tracked.state is State.LATE
         done = tracked is not None and tracked.success
@@ -163,6 +167,7 @@ class SgorNode(Node):
         now = time.monotonic()
         self._diagnostics.report(outcome.stamp_ns, outcome.frame, *status.level_of(outcome), {
             **status.details(tracked), **status.map_details(self._pipeline.mapper),
+            'edges unacknowledged': str(self._sink.unacknowledged_edges),
             'seconds': f'{now - self._began_at:.4f}',
             'latency': f'{now - scan.arrived_ns * 1e-9:.4f}'})
 

@@ -137,6 +137,8 @@ def test_set_pose_begins_a_track_there(pair, scans):
     partner.spin_until(lambda: publisher.get_subscription_count() > 0)
     publisher.publish(given_pose(np.eye(4), doubt, 'map'))
     partner.spin_until(lambda: 'set_pose: in the frame map' in node.log.read_text())
+    publisher.publish(given_pose(start, -doubt))
+    partner.spin_until(lambda: 'set_pose: its covariance is not pos' in node.log.read_text())
     publisher.publish(given_pose(start, doubt))
     partner.spin_until(lambda: 'starts a new track there' in node.log.read_text())
     for scan in scans[1:]:
