@@ -4,6 +4,7 @@ from pathlib import Path
 from types import ModuleType
 
 from ...core.common.settings import InputError
+from ..bags import compressed_or_ros1
 from . import bags
 from . import helipr
 from . import mulran
@@ -69,6 +70,8 @@ def open_drives(path: str | Path) -> list[Drive]:
         return bags.drives(path, path.stem)
     if not path.exists():
         raise InputError(f'{path}: no such file or folder')
+    if advice := compressed_or_ros1(path):
+        raise InputError(f'{path}: {advice}')
     if not path.is_dir():
         raise InputError(f'{path}: neither a bag nor a folder')
     folders = _folders(path)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.common.settings import InputError
+from ..scans import BIN_COLUMNS
 
 FASTEST_NS = 1_000_000
 """Scans are at least a millisecond apart: numbers closer than that count them."""
@@ -76,8 +77,9 @@ def increasing(stamps_ns: Sequence[int], where: Path, scans: Sequence[Path]) -> 
 
 
 def _stem(path: Path) -> str:
-    return path.name.removesuffix('.bin').removesuffix('.pcd') if path.name.endswith(
-        '.pcd.bin') else path.stem
+    name = path.name
+    ending = next((each for each in BIN_COLUMNS if name.endswith(each)), path.suffix)
+    return name.removesuffix(ending)
 
 
 def _are_decimal(paths: Sequence[Path]) -> bool:
