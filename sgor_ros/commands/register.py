@@ -1,13 +1,11 @@
 """`sgor_register`: two scans from files, the transformation between them."""
 from argparse import Namespace
-from dataclasses import asdict
 from dataclasses import replace
 import json
 import math
 from pathlib import Path
 import sys
 import time
-from typing import Any
 
 import numpy as np
 
@@ -64,7 +62,8 @@ def register_files(arguments: Namespace) -> int:
         **result.timings, 'preprocessing': preprocessing + result.timings['preprocessing']})
     for warning in result.warnings:
         print(f'warning: {warning}', file=sys.stderr)
-    document = json.dumps(_as_dict(result, arguments), indent=2) + '\n'
+    document = json.dumps({'source': str(arguments.source), 'target': str(arguments.target),
+                           **result.to_dict()}, indent=2) + '\n'
     to_stdout = arguments.json == STDOUT
     print(_text(result), file=sys.stderr if to_stdout else sys.stdout)
     if to_stdout:
@@ -140,23 +139,6 @@ def _text(result: Registration) -> str:
     lines.append(f'took {1e3 * sum(result.timings.values()):.0f} ms, '
                  f'{1e3 * result.timings["preprocessing"]:.0f} of them to preprocess both scans')
     return '\n'.join(lines)
-
-
-def _as_dict(result: Registration, arguments: Namespace) -> dict[str, Any]:
-    T, covariance = result.T_target_source, result.covariance
-    return {
-        'source': str(arguments.source), 'target': str(arguments.target),
-        'success': result.success, 'status': result.status.value, 'reason': result.reason,
-        'confidence': result.confidence,
-        # a refused candidate is nothing to build on; one of several, or one that slides, may be
-        'T_target_source': T.tolist() if T is not None and (
-            result.success or len(result.degenerate) or result.alternatives) else None,
-        'covariance': None if covariance is None else covariance.tolist(),
-        'degenerate': result.degenerate.tolist(),
-        'alternatives': [other.T_target_source.tolist() for other in result.alternatives],
-        'correspondences': len(result.inliers), 'inliers': int(result.inliers.sum()),
-        'score': None if result.score is None else asdict(result.score),
-        'warnings': list(result.warnings), 'timings_s': result.timings}
 
 
 def _plot(arguments: Namespace, source: SemanticScan, target: SemanticScan,

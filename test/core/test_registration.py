@@ -1,4 +1,6 @@
 """Two scans in, transformation out: the street, whose truth is known."""
+import json
+
 from conftest import errors
 from conftest import relative
 import numpy as np
@@ -380,3 +382,24 @@ def test_prepared_scans_bring_their_configuration(scans):
         assert found.status is Status.REFUSED
         assert 'min_confidence 1.00' in found.reason
     assert register(source, target, config.replace(min_confidence=0.85)).success
+
+
+def test_a_result_as_json_and_what_it_does_to_points(scans, street):
+    result = register(scans[3], scans[0])
+    told = json.loads(json.dumps(result.to_dict()))
+    assert told['success']
+    np.testing.assert_array_equal(told['T_target_source'], result.T_target_source)
+    assert told['inliers'] == result.inliers.sum()
+    moved = result.transform(street[3][0])
+    world = [points @ T[:3, :3].T + T[:3, 3] for points, T in (
+        (moved, street[0][2]), (street[3][0], street[3][2]))]
+    assert np.abs(world[0] - world[1]).max() < 0.5
+    np.testing.assert_allclose(result.transform([0.0, 0.0, 0.0]), result.T_target_source[:3, 3])
+    with pytest.raises(InputError, match=r'expected an \(N, 3\) array, got shape \(3, 2\)'):
+        result.transform(np.zeros((3, 2)))
+    rng = np.random.default_rng(0)
+    refused = register(*(rng.uniform(-30, 30, (5000, 3)) for _ in range(2)))
+    told = json.loads(json.dumps(refused.to_dict()))
+    assert (told['success'], told['T_target_source']) == (False, None)
+    with pytest.raises(InputError, match='transform: not registered: '):
+        refused.transform(np.zeros((1, 3)))
