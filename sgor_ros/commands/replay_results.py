@@ -8,6 +8,7 @@ import sys
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from tqdm import tqdm
 
 from ..evaluation.report.track_plots import plot_track
@@ -18,6 +19,7 @@ from ..io.trajectories import write_tum
 from ..pipeline.outcome import Outcome
 from ..pipeline.outcome import Row
 from ..tracker import Tracker
+from .replay_truth import in_words
 
 # then the terminal has seen enough; summary.json has them all
 PRINTED_WARNINGS = 20
@@ -87,10 +89,11 @@ def _statistics(seconds: list[float]) -> dict[str, float]:
             'p95': round(float(np.percentile(taken, 95)), 3)}
 
 
-def write_results(output: Path, rows: list[Row], summary: dict[str, Any], title: str) -> None:
+def write_results(output: Path, rows: list[Row], summary: dict[str, Any], title: str,
+                  truth: dict[int, NDArray[np.float64]]) -> None:
     """Write trajectories, summary and picture into a folder.
 
-    Each track has a frame of its own, and so files of its own.
+    Each track has a frame of its own, and so files of its own; `truth` has true poses by track.
     """
     stamps_ns = [row.stamp_ns for row in rows]
     for number, track in enumerate(summary['tracks'], 1):
@@ -101,7 +104,7 @@ def write_results(output: Path, rows: list[Row], summary: dict[str, Any], title:
     (output / 'summary.json').write_text(json.dumps(summary, indent=2) + '\n')
     plot_track(output / 'trajectory.png', title, [stamp * 1e-9 for stamp in stamps_ns],
                [row.T_odom_child for row in rows], [row.seconds for row in rows],
-               [row.confidence for row in rows], [row.track_id for row in rows])
+               [row.confidence for row in rows], [row.track_id for row in rows], truth)
 
 
 def print_results(summary: dict[str, Any], output: Path) -> None:
@@ -112,6 +115,8 @@ def print_results(summary: dict[str, Any], output: Path) -> None:
         error = (f'; APE {told["ape_before_m"]:.2f} m before, {told["ape_after_m"]:.2f} m after'
                  if 'ape_after_m' in told else '')
         print(f'{len(told["loops"])} loops closed among {told["nodes"]} nodes{error}')
+    for line in in_words(summary['truth']):
+        print(line)
     if (tracks := len(summary['tracks'])) > 1:
         print(f'{tracks} tracks, each in a frame of its own: trajectory.tum is the first, '
               f'trajectory_2.tum the second'

@@ -220,7 +220,7 @@ def test_a_picture_draws_no_line_from_track_to_track(tmp_path):
         pose[0, 3] = x
     poses[5] = None
     plot_track(tmp_path / 'a.svg', 'two', np.arange(7) / 10, poses, [0.1] * 7, [0.9] * 7,
-               [1, 1, 1, 2, 2, 2, 2])
+               [1, 1, 1, 2, 2, 2, 2], {})
     drawn = (tmp_path / 'a.svg').read_text()
     lines = [len(re.findall('[ML] ', path)) for colour in (*COLOURS[:2], LOST) for path in
              re.findall(rf'<path d="([^"]*)"[^>]*stroke: {colour}; stroke-width: 2', drawn)]

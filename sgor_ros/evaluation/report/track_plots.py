@@ -1,4 +1,5 @@
 """Pictures of a track of poses, alone or against ground truth."""
+from collections.abc import Mapping
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -44,7 +45,8 @@ class LabelledPoints(Protocol):
 
 def plot_track(path: str | Path, title: str, stamps_s: Sequence[float],
                poses: Sequence[Array | None], seconds: Sequence[float],
-               confidence: Sequence[float], tracks: Sequence[int]) -> None:
+               confidence: Sequence[float], tracks: Sequence[int],
+               truth: Mapping[int, Array]) -> None:
     """Draw the tracks of a drive from above, and time and confidence of each scan.
 
     Parameters
@@ -62,6 +64,8 @@ def plot_track(path: str | Path, title: str, stamps_s: Sequence[float],
         0 to 1; nan where nothing was registered.
     tracks : sequence of int
         Which track each scan belongs to: only poses of one are in one frame.
+    truth : mapping of int to (M, 4, 4) array
+        Where they are known, the true poses in the frame of each track.
     """
     figure = new_figure(13, 6.2)
     grid = figure.add_gridspec(2, 2, width_ratios=(1.15, 1))
@@ -74,8 +78,12 @@ def plot_track(path: str | Path, title: str, stamps_s: Sequence[float],
         scans = np.array([i for i in known if tracks[i] == track])
         part = np.array([poses[i] for i in scans])
         length_m += travelled_m(part)[-1]
+        if track in truth:
+            above.plot(*truth[track][:, :2, 3].T, '-', color=TRUTH, lw=3.5,
+                       label='' if number else 'ground truth')
         _draw_one_of(above, part[:, :2, 3], scans, number, len(several))
-    xy = np.array([T[:2, 3] for T in poses if T is not None])
+    xy = np.array([T[:2, 3] for T in (*poses, *(T for of in truth.values() for T in of))
+                   if T is not None])
     middle, half = (xy.min(axis=0) + xy.max(axis=0)) / 2, np.ptp(xy, axis=0).max() / 2
     half = max(half * (1 + 2 * SQUARE_MARGIN), 1.0)
     _frame(above, middle - half, middle + half)
