@@ -84,7 +84,7 @@ def _parser() -> Parser:
         'sgor_register', 'SOURCE TARGET [options]', 'Register two scans without an initial guess '
         'and print T_target_source, which maps points of the source into the target.',
         ('sgor_register a.bin b.bin --source-labels a.label --target-labels b.label',
-         'sgor_register a.ply b.ply --preset indoor --json result.json --plot pair.png'),
+         'sgor_register a.ply b.ply --json result.json --plot pair.png'),
         'registered', 'not registered; the reason is told')
     command.add_argument('source', type=Path, help='.bin, .pcd, .ply or .npz')
     command.add_argument('target', type=Path, help='likewise')

@@ -27,6 +27,7 @@ examples:
   ros2 run sgor_ros sgor_node --ros-args -r points:=/lidar/labelled
   ros2 run sgor_ros sgor_node --ros-args -p mode:=consecutive -p voxel_size:=0.3
   ros2 param describe /sgor_node voxel_size
+  .venv/bin/sgor_node --ros-args -r points:=/lidar/labelled    (ROS from wheels: no `ros2 run`)
 
 exit codes:
   0    ended by SIGINT or SIGTERM

@@ -61,7 +61,7 @@ class SgorNode(Node):
         self._log = ThrottledLog(self.get_logger())
         self._diagnostics = DiagnosticsPublisher(self, self._log, self.counts, self._idle)
         self._worker = threading.Thread(target=self._work, name='sgor worker')
-        self._compiled = False
+        self._compiled = self._placed = False
         self._heard_at = self._began_at = 0.0
         self.crash: Exception | None = None
         refuse_unknown_overrides(self, override_names(self))
@@ -155,6 +155,12 @@ class SgorNode(Node):
         outcome = self._pipeline.process(scan)
         if not outcome.frame:
             self._log.warn_once('the clouds have no frame_id: set the parameter sensor_frame')
+        if outcome.T_odom_child is not None and not self._placed:
+            self._placed = True
+            self.get_logger().info(
+                f'first pose, of {self._config.base_frame or outcome.frame} in '
+                f'{self._config.odom_frame}, at {outcome.stamp_ns * 1e-9:.3f} s; from now on the '
+                'log tells of trouble only, /diagnostics of each scan')
         if self._sink.unacknowledged_edges:
             self._log.warn_once('a subscriber of the edges does not keep up: it may miss some; '
                                 '/diagnostics counts them (edges unacknowledged)')
