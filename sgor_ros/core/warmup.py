@@ -28,8 +28,8 @@ from .scan.scan import SemanticScan
 def warm_up(config: SgorConfig | None = None) -> None:
     """Compile what is not compiled yet, so that the first real scan does not wait.
 
-    Registers a small made-up scene to itself. In a fresh environment that takes a quarter of a
-    minute or so, and the logger ``sgor_ros`` says it; afterwards, less than a second.
+    Registers a small made-up scene to itself. In a fresh environment that takes about half a
+    minute, and the logger ``sgor_ros`` says it; afterwards, less than a second.
 
     Parameters
     ----------

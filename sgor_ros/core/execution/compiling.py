@@ -12,6 +12,9 @@ from numba.core import event
 
 PACKAGE = __name__.partition('.')[0]
 
+TAKES = 'about half a minute'
+"""On two free cores; the pages say the same."""
+
 _thread = threading.local()
 
 
@@ -40,7 +43,7 @@ def loading_only() -> Iterator[None]:
 def tell() -> None:
     """Warn that it takes a while, once a process; where nobody logs, stderr gets it."""
     logging.getLogger(PACKAGE).warning(
-        'compiling for this machine: once, it takes a quarter of a minute or so')
+        f'compiling for this machine: once, it takes {TAKES}')
 
 
 def drop_damaged() -> int:
