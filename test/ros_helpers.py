@@ -4,8 +4,8 @@ import numpy as np
 from rclpy.qos import ReliabilityPolicy
 from scipy.spatial.transform import Rotation
 
+from sgor_ros.io.header_stamp import stamp_ns_of
 from sgor_ros.io.messages import point_cloud2
-from sgor_ros.io.messages import stamp_ns_of
 from sgor_ros.ros.playback.player import Player
 from sgor_ros.ros.playback.player import SETTLING_S
 from sgor_ros.ros.playback.player import values_of

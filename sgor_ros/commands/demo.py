@@ -22,8 +22,8 @@ from ..evaluation.report.track_plots import plot_against_truth
 from ..evaluation.report.track_plots import plot_errors
 from ..io.bags import BagReader
 from ..io.bags import CLOUD_TYPE
+from ..io.header_stamp import stamp_ns_of
 from ..io.messages import matrix_of
-from ..io.messages import stamp_ns_of
 from .command_line import FAILED
 from .command_line import OK
 from .command_line import Parser

@@ -128,7 +128,7 @@ def _sequence(arguments: Namespace, stream: StreamConfig, stack: ExitStack) -> S
     if is_bag(arguments.bag_path):
         bag = stack.enter_context(BagReader(arguments.bag_path))
         topic = arguments.topic or bag.find_topic(stream.label_field)
-        return BagSequence(bag, topic, stream.label_field)
+        return BagSequence(bag, topic, stream.label_field, stream.time_field)
     drive = open_drive(arguments.bag_path, arguments.sequence)
     if stream.label_field not in (AUTO, NONE):
         raise InputError(f'label_field = {stream.label_field!r}: only the clouds of a bag have '

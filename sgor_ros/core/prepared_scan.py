@@ -1,7 +1,9 @@
 """What `preprocess` makes of one scan (`PreparedScan`)."""
 from dataclasses import dataclass
 
+import numpy as np
 from numpy.typing import ArrayLike
+from numpy.typing import NDArray
 
 from .common.settings import InputError
 from .config import PREPARATION
@@ -46,6 +48,9 @@ class PreparedScan:
         Keypoints and descriptors of the caller.
     up : Up or None
         What was known of the direction up.
+    frame_covariance : (6, 6) array or None
+        Of its frame, in itself, for what is not known of the motion during the sweep, m^2 and
+        rad^2; None where there is none to know.
     """
 
     scan: SemanticScan | None
@@ -59,6 +64,7 @@ class PreparedScan:
     timings: dict[str, float]
     given: Given | None = None
     up: Up | None = None
+    frame_covariance: NDArray[np.float64] | None = None
 
     def check(self, config: SgorConfig, name: str) -> None:
         """Refuse a configuration that this scan was not prepared with.

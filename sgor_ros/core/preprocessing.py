@@ -102,7 +102,7 @@ def at_scale(prepared: PreparedScan, scale: float) -> PreparedScan:
         return prepared
     again = _prepare(prepared.raw('its scale is another'), prepared.config.replace(scale=scale),
                      prepared.given, None, prepared.up)
-    return replace(again, config=prepared.config)
+    return replace(again, config=prepared.config, frame_covariance=prepared.frame_covariance)
 
 
 def _up(scan: SemanticScan, before: ArrayLike | None) -> Up | None:

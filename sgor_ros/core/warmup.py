@@ -22,6 +22,7 @@ from .execution.compiling import tell
 from .preprocessing import preprocess
 from .registration import register
 from .registration import register_correspondences
+from .scan.deskewing import deskewed
 from .scan.scan import SemanticScan
 
 
@@ -64,7 +65,8 @@ def compiled(config: SgorConfig | None = None) -> bool:
 def _register_all(config: SgorConfig) -> None:
     walls, size = _walls(config)
     near = config.replace(min_range=0.0, max_range=4 * size)
-    prepared = preprocess(SemanticScan(walls, np.zeros(len(walls), np.int64)), near)
+    scan = SemanticScan(walls, np.zeros(len(walls), np.int64), times=np.zeros(len(walls)))
+    prepared = preprocess(deskewed(scan, np.zeros(6)), near)
     register(prepared, prepared, near)
     _solve(config)
 

@@ -23,10 +23,10 @@ from rosbags.typesys import Stores
 from ..core.common.settings import InputError
 from .bounded import BoundedPath
 from .broken import readable
+from .header_stamp import stamp_ns_of
 from .label_field import field_names
 from .label_field import label_field_of
 from .messages import matrix_of
-from .messages import stamp_ns_of
 from .writing import new_folder
 from .writing import refuse_existing
 

@@ -41,11 +41,6 @@ def stamp(types: Types, stamp_ns: int) -> Any:
     return types('builtin_interfaces/msg/Time')(sec=seconds, nanosec=nanoseconds)
 
 
-def stamp_ns_of(header: Any) -> int:
-    """Return the stamp of a header, nanoseconds."""
-    return int(header.stamp.sec) * 1_000_000_000 + int(header.stamp.nanosec)
-
-
 def header(types: Types, stamp_ns: int, frame_id: str) -> Any:
     """Return a std_msgs/msg/Header."""
     return types('std_msgs/msg/Header')(stamp=stamp(types, stamp_ns), frame_id=frame_id)

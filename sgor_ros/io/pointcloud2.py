@@ -10,7 +10,9 @@ from ..core.common.checks import as_labels
 from ..core.common.checks import as_points
 from ..core.common.settings import InputError
 from ..core.scan.scan import SemanticScan
+from .header_stamp import stamp_ns_of
 from .label_field import field_names
+from .time_field import seconds_since
 
 # the datatypes of sensor_msgs/msg/PointField
 FORMATS = {1: 'i1', 2: 'u1', 3: 'i2', 4: 'u2', 5: 'i4', 6: 'u4', 7: 'f4', 8: 'f8'}
@@ -23,7 +25,7 @@ LABEL_ROUNDING = 1e-3
 LARGEST_LABEL = 2.0**32
 
 
-def decode(message: Any, label_field: str) -> SemanticScan:
+def decode(message: Any, label_field: str, time_field: str = '') -> SemanticScan:
     """Read the points and labels of a cloud.
 
     Parameters
@@ -33,23 +35,27 @@ def decode(message: Any, label_field: str) -> SemanticScan:
     label_field : str
         Field with the class ids, of any integer or float type; empty for a scan without labels
         (see `label_field_of`).
+    time_field : str
+        Field with the time of each point; empty for none (see `time_field_of`).
 
     Raises
     ------
     InputError
         A field is missing or unusable, the data is shorter than the cloud, no point is finite.
     """
-    if label_field in ('x', 'y', 'z'):
-        raise InputError(f'field {label_field}: it holds coordinates, not class ids')
-    names = ('x', 'y', 'z', *((label_field,) if label_field else ()))
+    for name, what in ((label_field, 'class ids'), (time_field, 'times')):
+        if name in ('x', 'y', 'z'):
+            raise InputError(f'field {name}: it holds coordinates, not {what}')
+    names = tuple(dict.fromkeys(('x', 'y', 'z', *filter(None, (label_field, time_field)))))
     records = _records(message, names)
     points = np.empty((len(records), 3), np.float32)
     for axis, name in enumerate('xyz'):
         points[:, axis] = records[name]
-    if not label_field:
-        return SemanticScan(points)
-    return SemanticScan(points, whole_numbers(records[label_field], points,
-                                              f'field {label_field}'))
+    labels = whole_numbers(records[label_field], points,
+                           f'field {label_field}') if label_field else None
+    times = seconds_since(stamp_ns_of(message.header), records[time_field],
+                          time_field) if time_field else None
+    return SemanticScan(points, labels, times=times)
 
 
 def _records(message: Any, names: tuple[str, ...]) -> NDArray[Any]:

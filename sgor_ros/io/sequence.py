@@ -10,10 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.scan.scan import SemanticScan
+from .header_stamp import stamp_ns_of
+from .label_field import AUTO
 from .label_field import choice_in_words
 from .label_field import label_field_of
-from .messages import stamp_ns_of
 from .pointcloud2 import decode
+from .time_field import time_field_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +69,8 @@ class ScanSequence(Protocol):
     def __iter__(self) -> Iterator[StampedScan]: ...
 
 
-def scan_of_cloud(message: Any, label_field: str, arrived_ns: int) -> StampedScan:
+def scan_of_cloud(message: Any, label_field: str, arrived_ns: int,
+                  time_field: str = AUTO) -> StampedScan:
     """Return the scan of a sensor_msgs/msg/PointCloud2, of rclpy or of rosbags.
 
     Parameters
@@ -78,11 +81,15 @@ def scan_of_cloud(message: Any, label_field: str, arrived_ns: int) -> StampedSca
         As `label_field_of` takes it.
     arrived_ns : int
         As `StampedScan` has it.
+    time_field : str
+        As `time_field_of` takes it.
     """
     return StampedScan(
         stamp_ns_of(message.header), message.header.frame_id,
-        partial(_decoded, message, label_field), arrived_ns, choice_in_words(message, label_field))
+        partial(_decoded, message, label_field, time_field), arrived_ns,
+        choice_in_words(message, label_field))
 
 
-def _decoded(message: Any, label_field: str) -> SemanticScan:
-    return decode(message, label_field_of(message, label_field))
+def _decoded(message: Any, label_field: str, time_field: str) -> SemanticScan:
+    return decode(message, label_field_of(message, label_field),
+                  time_field_of(message, time_field))

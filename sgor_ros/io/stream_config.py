@@ -7,6 +7,7 @@ from ..core.common.settings import Settings
 from ..core.scan.point_clouds import LABEL_FIELDS
 from .frames import parse_transform
 from .label_field import AUTO
+from .time_field import TIME_FIELDS
 
 
 @dataclass(frozen=True)
@@ -16,6 +17,10 @@ class StreamConfig(Settings):
     label_field: str = setting(
         AUTO, 'Field of the clouds that holds the class ids; auto: the first of '
         f'{", ".join(LABEL_FIELDS)} that a cloud has; none: work without labels')
+    time_field: str = setting(
+        AUTO, 'Field of the clouds with the time of each point, by which scans are deskewed; '
+        f'auto: the first of {", ".join(TIME_FIELDS)} that a cloud has; none: for clouds that are '
+        'deskewed already, or sensors at rest')
     odom_frame: str = setting(
         'odom', 'Frame of the published poses; its origin is the first scan')
     map_frame: str = setting(
@@ -26,7 +31,8 @@ class StreamConfig(Settings):
         '', 'Frame whose odometry is published, such as base_link; empty: the frame of the sensor')
     T_base_sensor: str = setting(
         '', 'Pose of the sensor in base_frame, x y z roll pitch yaw as in a URDF, m and rad; '
-        'empty: the node looks it up in tf2 at the stamp of each scan')
+        'empty: the node looks it up in tf2 at the stamp of each scan. It tells which way is up; '
+        'and where the sensor is in clouds that lie in base_frame already')
 
     def __post_init__(self) -> None:
         """Check the frames too."""

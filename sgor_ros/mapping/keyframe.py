@@ -33,6 +33,8 @@ class Keyframe:
         A few hundred kilobytes, for `register` when it is restored.
     descriptor : (D,) float32
         What it looks like: see `retrieval`.
+    frame_covariance : (6, 6) float64 or None
+        As of `PreparedScan`.
     """
 
     id: int
@@ -40,6 +42,7 @@ class Keyframe:
     track_id: int
     scan: CompactScan
     descriptor: Descriptor
+    frame_covariance: Array | None = None
 
 
 class Keyframes:
@@ -68,9 +71,11 @@ class Keyframes:
         return sum(one.scan.nbytes + one.descriptor.nbytes for one in self)
 
     def add(self, node: int, stamp_ns: int, track_id: int, prepared: PreparedScan) -> None:
-        """Keep a scan."""
-        keyframe = Keyframe(node, stamp_ns, track_id, compact(prepared), describe(prepared))
+        """Keep a scan; one of the same node gives way to it."""
+        keyframe = Keyframe(node, stamp_ns, track_id, compact(prepared), describe(prepared),
+                            prepared.frame_covariance)
         self._kept[node] = keyframe
+        self._restored.pop(node, None)
         self._retrieval.add(node, keyframe.descriptor)
 
     def alike(self, prepared: PreparedScan) -> list[int]:

@@ -92,6 +92,7 @@ class Mapper:
         if tracked.state in (State.FAILED, State.LOST) and self._is_elsewhere(scan):
             self.tracker.begin_track()
             self._notes.append('the sensor is at another place of the map: a new track begins')
+        self._keep_deskewed()
         keyframe = self.tracker.reference if tracked.keyframe else None
         return self.add(tracked, None if keyframe is None else keyframe.prepared)
 
@@ -161,6 +162,15 @@ class Mapper:
         self.candidates.add(node.id, prepared, place.candidates(self._odometry.nodes), c.waiting)
         if not place.is_covered():
             self.keyframes.add(node.id, node.stamp_ns, node.track_id, prepared)
+
+    def _keep_deskewed(self) -> None:
+        """Keep a keyframe anew whose motion was known only when the next scan came."""
+        reference = self.tracker.reference
+        if reference is None or reference.id not in self.keyframes:
+            return
+        kept = self.keyframes[reference.id]
+        if kept.frame_covariance is not reference.prepared.frame_covariance:
+            self.keyframes.add(kept.id, kept.stamp_ns, kept.track_id, reference.prepared)
 
     def _is_elsewhere(self, scan: SemanticScan) -> bool:
         """Whether a scan that the tracker cannot place is at a place of the map, and far from it.

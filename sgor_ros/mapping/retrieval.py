@@ -73,7 +73,10 @@ class Retrieval:
         self._rows = np.empty((0, 0), np.float32)
 
     def add(self, keyframe: int, descriptor: Descriptor) -> None:
-        """Remember one more."""
+        """Remember one more, or another descriptor of one."""
+        if keyframe in self._ids:
+            self._rows[self._ids.index(keyframe)] = descriptor
+            return
         count = len(self._ids)
         if count == len(self._rows):
             grown = np.empty((max(64, 2 * count), len(descriptor)), np.float32)

@@ -13,6 +13,7 @@ from ..core.config import prepares_alike
 from ..core.config import SgorConfig
 from ..core.prepared_scan import PreparedScan
 from ..core.registration import register
+from ..tracker.deskewing import with_frames
 from .candidates import Candidate
 from .candidates import Candidates
 from .edge import Edge
@@ -79,8 +80,8 @@ class Verification:
             Whether to wait for those elsewhere.
         """
         if self._executor is None or at_once:
-            return _edges((candidate, self.one(candidate, keyframes, config))
-                          for candidate in candidates.take(count))
+            return _edges(((candidate, self.one(candidate, keyframes, config))
+                           for candidate in candidates.take(count)), keyframes)
         try:
             for candidate in candidates.take(count - len(self._at_work)):
                 self._at_work.append((candidate, self._executor.submit(
@@ -88,7 +89,7 @@ class Verification:
                     keyframes[candidate.target].scan, config.replace(threads=1))))
             done = [one for one in self._at_work if wait or one[1].done()]
             self._at_work = [one for one in self._at_work if one not in done]
-            return _edges((candidate, future.result()) for candidate, future in done)
+            return _edges(((candidate, future.result()) for candidate, future in done), keyframes)
         except BrokenExecutor as error:
             self.fault = f'loops are not closed any more: {error}'
             self._executor, self._at_work = None, []
@@ -99,6 +100,9 @@ class Verification:
         return verify(candidate.prepared, keyframes.restored(candidate.target), config)
 
 
-def _edges(pairs: Iterable[tuple[Candidate, Found]]) -> list[Edge]:
-    return [Edge(candidate.target, candidate.source, *found, Kind.LOOP)
-            for candidate, found in pairs if found is not None]
+def _edges(pairs: Iterable[tuple[Candidate, Found]], keyframes: Keyframes) -> list[Edge]:
+    return [Edge(candidate.target, candidate.source, T, with_frames(
+                covariance, T, candidate.prepared.frame_covariance,
+                keyframes[candidate.target].frame_covariance), Kind.LOOP)
+            for candidate, found in pairs if found is not None
+            for T, covariance in (found,)]

@@ -23,6 +23,7 @@ from ..mapping.map_cloud import map_cloud
 from ..tracker import TrackedScan
 from ..tracker import Tracker
 from .extrinsic import Extrinsic
+from .extrinsic import mounted
 from .outcome import Outcome
 from .sinks import CORRESPONDENCES
 from .sinks import LOOP_CLOSURE
@@ -78,6 +79,7 @@ class Pipeline:
         self._frame = ''
         self._keyframe_frames: dict[int, str] = {}
         self._placed: TrackedScan | None = None
+        self._mount: tuple[str, int, NDArray[np.float64]] | None = None    # frame, stamp, pose
 
     def begin_at(self, T_odom_child: NDArray[np.float64], covariance: NDArray[np.float64]) -> None:
         """Let the next track begin at a pose, (4, 4) with (6, 6), of the frame it publishes."""
@@ -104,7 +106,7 @@ class Pipeline:
         """Return what became of a scan, and its messages by topic."""
         begin = time.perf_counter()
         points = scan.read()
-        tracked = self._track(points, scan.stamp_ns, frame)
+        tracked = self._track(self._mounted(points, scan.stamp_ns, frame), scan.stamp_ns, frame)
         seconds = time.perf_counter() - begin
         placed = self._place(tracked, frame)
         reference_frame = self._keyframe_frames.get(tracked.reference_id or 0, frame)
@@ -117,6 +119,30 @@ class Pipeline:
                                 else (tracked.reason, placed.T_odom_sensor))
         return Outcome(scan.stamp_ns, frame, reason, points, tracked, T_odom_child,
                        seconds), published
+
+    def _mounted(self, scan: SemanticScan, stamp_ns: int, frame: str) -> SemanticScan:
+        """Return the scan with which way is up, by the mount of the scan before or its own.
+
+        Where the mount of its own frame is known no scan waits for a transform before it is
+        tracked.
+        """
+        if self._extrinsic is None:
+            return scan
+        if ((self._mount is None or self._mount[0] != frame)
+                and isinstance(self._T_base_sensor(stamp_ns, frame), str)):
+            return scan
+        assert self._mount is not None
+        return mounted(scan, frame, self._mount[2], self._config)
+
+    def _T_base_sensor(self, stamp_ns: int, frame: str) -> NDArray[np.float64] | str:
+        """Return the mount at a stamp, asked for once, or why there is none."""
+        assert self._extrinsic is not None
+        if self._mount is not None and self._mount[:2] == (frame, stamp_ns):
+            return self._mount[2]
+        found = self._extrinsic(stamp_ns, frame)
+        if not isinstance(found, str):
+            self._mount = frame, stamp_ns, found
+        return found
 
     def _track(self, scan: SemanticScan, stamp_ns: int, frame: str) -> TrackedScan:
         tracked = (self.mapper or self.tracker).track(scan, stamp_ns)
@@ -131,7 +157,7 @@ class Pipeline:
         """Return the scan as one of the base, in the odom frame, or why it cannot be placed."""
         T_base_sensor: NDArray[np.float64] | None = None
         if tracked.success and self._extrinsic is not None:
-            found = self._extrinsic(tracked.stamp_ns, frame)
+            found = self._T_base_sensor(tracked.stamp_ns, frame)
             if isinstance(found, str):
                 return found
             T_base_sensor = found

@@ -8,7 +8,7 @@ from rclpy.node import Node
 from sensor_msgs.msg import PointCloud2
 
 from ..core.warmup import warm_up
-from ..io import messages
+from ..io.header_stamp import stamp_ns_of
 from ..io.sequence import ScanSequence
 from ..io.sequence import StampedScan
 from ..mapping import Mapper
@@ -55,7 +55,8 @@ class SgorNode(Node):
         self._loops: ProcessPoolExecutor | None = None
         self._pipeline = self._pipeline_of(self._config)
         self._requests = Services(self, self._config.odom_frame)
-        self._stream = CloudStream(self.resolve_topic_name('points'), self._config.label_field)
+        self._stream = CloudStream(self.resolve_topic_name('points'), self._config.label_field,
+                                   self._config.time_field)
         self._gaps = StampGaps()
         self._processed = self._failed = self._late = self._paused = 0
         self._log = ThrottledLog(self.get_logger())
@@ -116,7 +117,7 @@ class SgorNode(Node):
 
     def _receive(self, cloud: PointCloud2) -> None:
         self._heard_at = time.monotonic()
-        self._gaps.take(messages.stamp_ns_of(cloud.header))
+        self._gaps.take(stamp_ns_of(cloud.header))
         if self._requests.paused:
             self._paused += 1
         else:

@@ -197,3 +197,8 @@ def _along(degenerate: Array) -> str:
         if np.linalg.norm(row[:3]) >= np.linalg.norm(row[3:])
         else f'the turn about ({", ".join(f"{value:.2f}" for value in row[3:])})'
         for row in degenerate)
+
+
+def registered_covariance(found: Registration | None) -> Array:
+    """Return the (6, 6) covariance of a registration, or what to take where it has none."""
+    return UNKNOWN_COVARIANCE if found is None or found.covariance is None else found.covariance

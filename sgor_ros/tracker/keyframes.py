@@ -46,7 +46,8 @@ class Keyframe:
         if prepares_alike(self.prepared.config, config):
             return self
         scan = self.prepared.raw('the settings have changed')
-        return replace(self, prepared=preprocess(scan, config))
+        return replace(self, prepared=replace(
+            preprocess(scan, config), frame_covariance=self.prepared.frame_covariance))
 
     def distance(self, other: 'Keyframe') -> float:
         """Return the metres to another; infinite where it is in another frame."""
@@ -83,6 +84,10 @@ class Keyframes:
         """Remember a keyframe, if it is not remembered yet."""
         if all(one.id != keyframe.id for one in self._kept):
             self.add(keyframe, limit)
+
+    def renew(self, keyframe: Keyframe) -> None:
+        """Put a keyframe in place of the one of its number, where that is remembered."""
+        self._kept = [keyframe if one.id == keyframe.id else one for one in self._kept]
 
     def last(self, track_id: int) -> Keyframe | None:
         """Return the newest of a track."""

@@ -1,6 +1,9 @@
 """The scan that the tracker is working on, and what is known of it so far."""
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ..core.prepared_scan import PreparedScan
 from ..core.verdict.result import Registration
 from .keyframes import Keyframe
@@ -19,6 +22,10 @@ class ScanAtWork:
     registration: Registration | None = None
     reference: Keyframe | None = None
     confirmed: bool = False
+    middle_s: float | None = None
+    """Of its sweep since its stamp; None where its points have no times."""
+    deskewed_by: NDArray[np.float64] | None = None
+    """Twist, m/s and rad/s; None where it is as it came."""
 
     def spent(self, timings: dict[str, float]) -> None:
         """Add the seconds of stages."""

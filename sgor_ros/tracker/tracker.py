@@ -16,11 +16,18 @@ from ..core.verdict.result import Registration
 from .choice import choose
 from .choice import is_likely
 from .choice import refined
+from .choice import registered_covariance
 from .choice import relocalised
 from .choice import Step
 from .choice import UNKNOWN_COVARIANCE
 from .config import TrackerConfig
 from .covariance import PoseCovariance
+from .deskewing import by_expected_motion
+from .deskewing import by_step
+from .deskewing import is_skewed
+from .deskewing import LONGEST_STEP_S
+from .deskewing import Sweep
+from .deskewing import with_frames
 from .keyframe_selection import is_keyframe
 from .keyframe_selection import is_new_place
 from .keyframe_selection import overlap
@@ -109,17 +116,23 @@ class Tracker:
 
     def _process(self, scan: SemanticScan, stamp_ns: int, warnings: list[str]) -> TrackedScan:
         """Find the pose of a scan that is on time."""
+        middle_s = None if scan.times is None else float(scan.times.mean())
+        unknown = Motion.unknown(stamp_ns, np.eye(4), np.zeros((6, 6)), self.tracker_config)
+        scan, frame_covariance = by_expected_motion(scan, self._sweep, unknown.twist_covariance)
         prepared = preprocess(
             scan, self.config,
             scale_before=self._reference.prepared.scale if self._reference else None,
             up_before=self._up)
         self._up = prepared.ground.normal if prepared.ground else None
+        prepared = replace(prepared, frame_covariance=frame_covariance)
         new = ScanAtWork(prepared, stamp_ns, [*warnings, *prepared.warnings],
-                         dict(prepared.timings))
+                         dict(prepared.timings), middle_s=middle_s,
+                         deskewed_by=self._sweep.twist if self._sweep else None)
         if self._reference is None:
             return self._begin(new)
         step = self._predicted_step(new) or self._step(new, self._reference)
         if isinstance(step, Step):
+            step = self._deskewed_again(new, step)
             # in a new track each new place is a chance to find back to an old track
             new_place = is_new_place(step.T_reference_sensor, self._reference,
                                      self._last_keyframe(), self.tracker_config)
@@ -136,6 +149,7 @@ class Tracker:
         self._track_id = self._tracks
         self._failures = 0
         self._registered = False
+        self._sweep: Sweep | None = None    # the last one with a pose, of scans with times
 
     def _drop(self, stamp_ns: int) -> TrackedScan:
         self._late += 1
@@ -162,6 +176,7 @@ class Tracker:
         self._track_id = self._tracks
         self._failures = 0
         self._registered = False
+        self._sweep = None
         origin = PoseCovariance.origin()
         self._reference = self._keyframe(new, np.eye(4), origin)
         self._motion = Motion.unknown(new.stamp_ns, np.eye(4), np.zeros((6, 6)),
@@ -212,7 +227,8 @@ class Tracker:
                 or not self._keeps_keyframe(found.T_target_source, found)
                 or not is_likely(found, prediction)):
             return None
-        step = Step(found.T_target_source, found.covariance, found.correlated_error)
+        step = self._with_frames(Step(found.T_target_source, found.covariance,
+                                      found.correlated_error), new, self._reference)
         if motion.impossible(new.stamp_ns, step.T_reference_sensor, c):
             return None
         new.registration, new.reference, new.confirmed = found, self._reference, True
@@ -246,7 +262,38 @@ class Tracker:
                                self.tracker_config)
         if new.registration is None or not isinstance(step, str):
             new.registration, new.reference = found, keyframe
-        return step
+        return step if isinstance(step, str) else self._with_frames(step, new, keyframe)
+
+    def _with_frames(self, step: Step, new: ScanAtWork, keyframe: Keyframe) -> Step:
+        """Return a step that knows what is left of the bend of both scans."""
+        return step if step.covariance is None else replace(step, covariance=with_frames(
+            step.covariance, step.T_reference_sensor, new.prepared.frame_covariance,
+            keyframe.prepared.frame_covariance))
+
+    def _deskewed_again(self, new: ScanAtWork, step: Step) -> Step:
+        """Register once more without the bend where nobody knew the motion before this step."""
+        reference = new.reference
+        assert reference is not None
+        seconds = (new.stamp_ns - reference.stamp_ns) * 1e-9
+        if not (is_skewed(new.prepared) and is_skewed(reference.prepared)
+                and reference is self._reference
+                and 0 < seconds < LONGEST_STEP_S):
+            return step
+        bent, registration = new.prepared, new.registration
+        twist = se3.log(step.T_reference_sensor) / seconds
+        covariance = registered_covariance(registration) / seconds**2
+        new.prepared = by_step(bent, twist, covariance)
+        again = self._step(new, replace(
+            reference, prepared=by_step(reference.prepared, twist, covariance)))
+        if isinstance(again, str):
+            new.prepared, new.registration, new.reference = bent, registration, reference
+            self._reference = reference
+            return step
+        new.deskewed_by = twist
+        self._sweep = Sweep.of(reference.track_id, reference.stamp_ns, reference.T_odom_sensor,
+                               np.zeros((6, 6)), twist, new.middle_s or 0.0)
+        self._keyframes.renew(self._reference)
+        return again
 
     def _relocalise(self, new: ScanAtWork, tries: int, *, earlier: bool = False) -> Step | None:
         """Try other keyframes, or those of earlier tracks; each scan a few, in turns."""
@@ -270,6 +317,11 @@ class Tracker:
         self._reference, self._track_id, self._failures = keyframe, keyframe.track_id, 0
         self._registered = new.registration.success
         T_odom_sensor = keyframe.T_odom_sensor @ T
+        if new.middle_s is not None:
+            sweep = Sweep.of(self._track_id, new.stamp_ns, T_odom_sensor,
+                             registered_covariance(new.registration), new.deskewed_by,
+                             new.middle_s)
+            self._sweep = self._sweep.then(sweep) if self._sweep else sweep
         covariance = None
         if keyframe.covariance is not None and step.covariance is not None:
             covariance = keyframe.covariance.then(keyframe.T_odom_sensor, T, step.covariance,

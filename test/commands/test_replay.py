@@ -28,10 +28,10 @@ from sgor_ros.io.bags import BagReader
 from sgor_ros.io.bags import BagWriter
 from sgor_ros.io.colours import LOST
 from sgor_ros.io.frames import parse_transform
+from sgor_ros.io.header_stamp import stamp_ns_of
 from sgor_ros.io.messages import header
 from sgor_ros.io.messages import matrix_of
 from sgor_ros.io.messages import point_cloud2
-from sgor_ros.io.messages import stamp_ns_of
 from sgor_ros.io.trajectories import read_kitti
 
 CLOUD = 'sensor_msgs/msg/PointCloud2'

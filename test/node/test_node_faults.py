@@ -10,8 +10,8 @@ from ros_helpers import street
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 
+from sgor_ros.io.header_stamp import stamp_ns_of
 from sgor_ros.io.messages import matrix_of
-from sgor_ros.io.messages import stamp_ns_of
 from sgor_ros.ros.playback.node_process import NodeProcess
 from sgor_ros.world import Lidar
 from sgor_ros.world import simulate

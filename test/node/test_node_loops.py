@@ -9,8 +9,8 @@ from return_drive import return_drive
 from return_drive import THERE
 import ros_helpers as ros
 
+from sgor_ros.io.header_stamp import stamp_ns_of
 from sgor_ros.io.messages import matrix_of
-from sgor_ros.io.messages import stamp_ns_of
 from sgor_ros.ros.playback.node_process import NodeProcess
 
 pytest.importorskip('gtsam')

@@ -7,8 +7,8 @@ import ros_helpers as ros
 from ros_helpers import street
 
 from sgor_ros.commands.demo import forth_and_back
+from sgor_ros.io.header_stamp import stamp_ns_of
 from sgor_ros.io.messages import matrix_of
-from sgor_ros.io.messages import stamp_ns_of
 from sgor_ros.ros.playback.domain import Domain
 from sgor_ros.ros.playback.node_process import NodeProcess
 

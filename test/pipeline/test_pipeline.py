@@ -134,6 +134,34 @@ def test_an_extrinsic_that_is_not_known_holds_back_what_needs_it(street, tmp_pat
     assert errors(outcomes[2].T_odom_child, truth)[0] < 0.15
 
 
+@pytest.mark.parametrize('frame', ['lidar', 'base'])
+def test_the_mount_tells_what_is_up_and_where_the_sensor_is(street, frame):
+    """Clouds of a sensor that hangs upside down, in its own frame and in that of the base."""
+    config = StreamConfig(base_frame='base', T_base_sensor='1.2 -0.3 2.0 3.0 0.1 1.5')
+    mount = parse_transform(config.T_base_sensor, 'mount')
+    T_frame_street = np.linalg.inv(mount) if frame == 'lidar' else np.eye(4)
+
+    def read(index):
+        points, labels, _ = street[index]
+        return SemanticScan(points @ T_frame_street[:3, :3].T + T_frame_street[:3, 3], labels)
+
+    pipeline = Pipeline(Tracker(), config, None, extrinsic.configured(config))
+    outcomes = [pipeline.process(stamped(street, index, frame, read=partial(read, index)))
+                for index in (0, 2)]
+    prepared = pipeline.tracker.reference.prepared
+    up, origin = ((mount[2, :3], np.zeros(3)) if frame == 'lidar' else
+                  ([0, 0, 1], mount[:3, 3]))
+    np.testing.assert_allclose(prepared.up.direction, up, atol=1e-12)
+    assert prepared.up.told
+    T_base_cloud = np.eye(4) if frame == 'base' else mount
+    scan = extrinsic.mounted(read(0), frame, T_base_cloud, config)
+    np.testing.assert_allclose(scan.origin, origin)
+    np.testing.assert_allclose(prepared.ground.normal, up, atol=0.02)
+    metres, degrees = errors(outcomes[1].T_odom_child, relative(street[0][2], street[2][2]))
+    assert metres < 0.15
+    assert degrees < 0.3
+
+
 @pytest.mark.parametrize('inverted', [False, True])
 def test_the_transform_is_that_of_the_odometry(street, tmp_path, inverted):
     sink = Memory(tmp_path)

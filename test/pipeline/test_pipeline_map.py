@@ -12,9 +12,9 @@ from sgor_ros import Mapper
 from sgor_ros import SemanticScan
 from sgor_ros.core.common import se3
 from sgor_ros.io.frames import parse_transform
+from sgor_ros.io.header_stamp import stamp_ns_of
 from sgor_ros.io.messages import matrix_of
 from sgor_ros.io.messages import matrix_of_transform
-from sgor_ros.io.messages import stamp_ns_of
 from sgor_ros.io.pointcloud2 import decode
 from sgor_ros.io.sequence import StampedScan
 from sgor_ros.io.stream_config import StreamConfig

@@ -1,4 +1,5 @@
 """One scan as it comes in: points and labels (`SemanticScan`)."""
+from copy import copy
 from dataclasses import dataclass
 from typing import Any
 from typing import Protocol
@@ -15,6 +16,8 @@ from .point_clouds import points_and_labels
 
 ORIGIN = np.zeros(3)
 """Where the sensor is, as a rule."""
+LONGEST_SWEEP = 10.0
+"""Seconds: no sensor takes longer, and stamps of another clock are no times of points."""
 ROUNDED = 1e-3
 """Metres: what is told of rounding to float32, which begins some 10 km from the origin."""
 
@@ -47,11 +50,15 @@ class SemanticScan:
     up : (3,) array, optional
         Which way is up in that frame, from the mount or gravity, to within 30 degrees. Without
         it the scan itself has to tell.
+    times : (N,) array of numbers, optional
+        When each point was taken, seconds since the stamp of the scan, where the sensor moves
+        while it sweeps: the tracker takes the bend out. `register` by itself does not.
 
     Raises
     ------
     InputError
-        Wrong shape or type; labels of another length; no finite point; an `up` without length.
+        Wrong shape or type; labels or times of another length; no finite point; an `up` without
+        length; times that are not finite or beyond `LONGEST_SWEEP`.
     """
 
     points: NDArray[np.float32]
@@ -59,16 +66,19 @@ class SemanticScan:
     origin: NDArray[np.float64]
     up: NDArray[np.float64] | None
     """Of length one."""
+    times: NDArray[np.float64] | None
     rounding: float
     """How far off half of the points are at least for being kept as float32, metres; 0: little."""
 
     def __init__(self, points: ArrayLike | PointCloud, labels: ArrayLike | None = None, *,
-                 origin: ArrayLike | None = None, up: ArrayLike | None = None) -> None:
+                 origin: ArrayLike | None = None, up: ArrayLike | None = None,
+                 times: ArrayLike | None = None) -> None:
         exact, found = points_and_labels(points)
         labels = found if labels is None else labels
         with np.errstate(over='ignore'):
             clean = exact.astype(np.float32, order='C')
         ids = None if labels is None else as_labels(labels, len(clean), 'labels').copy()
+        taken = None if times is None else _times(times, len(clean))
         finite = finite_rows(clean)
         if not finite.any():
             raise InputError(f'points: none of {len(clean)} is finite' if len(clean)
@@ -76,12 +86,39 @@ class SemanticScan:
         if not finite.all():
             exact, clean = exact[finite], clean[finite]
             ids = None if ids is None else ids[finite]
+            taken = None if taken is None else taken[finite]
+        if taken is not None and not (np.abs(taken) < LONGEST_SWEEP).all():
+            raise InputError(f'times: {taken[np.argmax(~(np.abs(taken) < LONGEST_SWEEP))]:g}, '
+                             f'expected seconds, within {LONGEST_SWEEP:g} of the stamp')
         object.__setattr__(self, 'points', clean)
         object.__setattr__(self, 'labels', ids)
         object.__setattr__(self, 'origin',
                            ORIGIN if origin is None else _vector(origin, 'origin'))
         object.__setattr__(self, 'up', None if up is None else _unit(_vector(up, 'up'), 'up'))
+        object.__setattr__(self, 'times', taken)
         object.__setattr__(self, 'rounding', _rounding(exact, clean))
+
+    def mounted(self, *, up: ArrayLike, origin: ArrayLike | None = None) -> 'SemanticScan':
+        """Return the same scan where the mount of the sensor is known; what it says itself stays.
+
+        Parameters
+        ----------
+        up, origin : (3,) array
+            As of the class.
+        """
+        known = copy(self)    # the same points
+        if self.up is None:
+            object.__setattr__(known, 'up', _unit(_vector(up, 'up'), 'up'))
+        if origin is not None and not self.origin.any():
+            object.__setattr__(known, 'origin', _vector(origin, 'origin'))
+        return known
+
+    def with_points(self, points: NDArray[np.float32]) -> 'SemanticScan':
+        """Return the same scan with (N, 3) other points, all of them taken at its stamp."""
+        other = copy(self)
+        object.__setattr__(other, 'points', points)
+        object.__setattr__(other, 'times', None)
+        return other
 
     def seen_from_sensor(self, points: NDArray[Any]) -> NDArray[Any]:
         """Return (N, 3) points of its frame relative to the sensor, metres."""
@@ -96,6 +133,20 @@ class SemanticScan:
     def __repr__(self) -> str:
         labels = '' if self.labels is None else f', {len(np.unique(self.labels))} label ids'
         return f'SemanticScan({len(self)} points{labels})'
+
+
+def _times(value: ArrayLike, count: int) -> NDArray[np.float64]:
+    """Return a copy of (N,) times.
+
+    Raises
+    ------
+    InputError
+        They are none.
+    """
+    times = as_numbers(value, 'times').astype(np.float64)
+    if times.shape != (count,):
+        raise InputError(f'times: expected shape ({count},), got {times.shape}')
+    return times
 
 
 def _vector(value: ArrayLike, name: str) -> NDArray[np.float64]:

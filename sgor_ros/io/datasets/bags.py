@@ -41,6 +41,8 @@ class BagSequence:
     topic : str
     label_field : str
         As `label_field_of` takes it.
+    time_field : str
+        As `time_field_of` takes it.
 
     Attributes
     ----------
@@ -58,13 +60,16 @@ class BagSequence:
         No such topic of clouds. While iterating: a bag that breaks off.
     """
 
-    def __init__(self, bag: BagReader, topic: str, label_field: str = AUTO) -> None:
+    def __init__(self, bag: BagReader, topic: str, label_field: str = AUTO,
+                 time_field: str = AUTO) -> None:
         self.name = topic
         self.expected = bag.count(topic)
         self.label_convention = None
         self._bag = bag
         self._label_field = label_field
-        first = [_scan_of(cloud, label_field).stamp_ns for cloud in islice(bag.clouds(topic), 2)]
+        self._time_field = time_field
+        first = [_scan_of(cloud, label_field, time_field).stamp_ns
+                 for cloud in islice(bag.clouds(topic), 2)]
         self._stampless = first == [0, 0]
         self.warnings = (('the clouds have no stamps (all are zero): the times of their recording '
                           'serve',) if self._stampless else ())
@@ -72,7 +77,7 @@ class BagSequence:
     def __iter__(self) -> Iterator[StampedScan]:
         """Iterate over the scans; reading one whose message is broken raises InputError."""
         for cloud in self._bag.clouds(self.name):
-            scan = _scan_of(cloud, self._label_field)
+            scan = _scan_of(cloud, self._label_field, self._time_field)
             # a cloud that has one all the same, or is broken, is not another's
             yield scan if scan.stamp_ns or not self._stampless else replace(
                 scan, stamp_ns=cloud.bag_time_ns)
@@ -113,7 +118,7 @@ class _OpenBag:
         """Return the one scan that was recorded at a time; the stamp tells it from others."""
         with self._lock:
             for cloud in self.reader().clouds(topic, recorded_ns):
-                scan = _scan_of(cloud, AUTO)
+                scan = _scan_of(cloud, AUTO, AUTO)
                 if scan.stamp_ns in (stamp_ns, 0):    # of the zeros, times of recording are told
                     return scan.read()
         raise InputError(f'{self._path}: the cloud of {topic} at {stamp_ns} is gone')
@@ -159,14 +164,14 @@ def _true_poses(bag: BagReader, stamps_ns: list[int]) -> NDArray[np.float64] | N
     return np.array(poses) if 0 < len(poses) == len(stamps_ns) else None
 
 
-def _scan_of(cloud: RecordedCloud, label_field: str) -> StampedScan:
+def _scan_of(cloud: RecordedCloud, label_field: str, time_field: str) -> StampedScan:
     """Return the scan of a cloud; of a broken one, when it was recorded, and why it is broken."""
     try:
         message = cloud.read()[2]
     except InputError as error:
         return StampedScan(cloud.bag_time_ns, '', partial(_refuse, str(error)),
                            cloud.bag_time_ns)
-    return scan_of_cloud(message, label_field, cloud.bag_time_ns)
+    return scan_of_cloud(message, label_field, cloud.bag_time_ns, time_field)
 
 
 def _refuse(reason: str) -> SemanticScan:

@@ -17,6 +17,8 @@ class CloudStream:
     topic : str
     label_field : str
         As `label_field_of` takes it.
+    time_field : str
+        As `time_field_of` takes it.
 
     Attributes
     ----------
@@ -29,9 +31,10 @@ class CloudStream:
     T_world_sensor = None
     warnings = ()
 
-    def __init__(self, topic: str, label_field: str) -> None:
+    def __init__(self, topic: str, label_field: str, time_field: str) -> None:
         self.name = topic
         self._label_field = label_field
+        self._time_field = time_field
         self._slot: LatestValueSlot[tuple[PointCloud2, int]] = LatestValueSlot()
 
     @property
@@ -55,4 +58,4 @@ class CloudStream:
     def __iter__(self) -> Iterator[StampedScan]:
         """Wait for one cloud after the other until the stream is closed."""
         for cloud, arrived_ns in self._slot:
-            yield scan_of_cloud(cloud, self._label_field, arrived_ns)
+            yield scan_of_cloud(cloud, self._label_field, arrived_ns, self._time_field)

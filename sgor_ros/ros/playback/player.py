@@ -15,7 +15,7 @@ from rclpy.qos import QoSProfile
 from rclpy.qos import ReliabilityPolicy
 from sensor_msgs.msg import PointCloud2
 
-from ...io.messages import stamp_ns_of
+from ...io.header_stamp import stamp_ns_of
 from .domain import Domain
 
 # a fresh machine compiles at the first start, a slow one for minutes

@@ -14,11 +14,14 @@ SCRIPT = """
 import numpy as np
 
 from sgor_ros import preprocess, register, register_correspondences, SemanticScan, SgorConfig
+from sgor_ros.core.scan.deskewing import deskewed
 from sgor_ros.world import Lidar, simulate
 
 lidar = Lidar(beams=24, columns=400)
-(_, p, p_labels, _), (_, q, q_labels, _) = list(simulate(12, 0, lidar=lidar))[::11]
 rng = np.random.default_rng(0)
+scan = SemanticScan(rng.uniform(-60, 60, (5000, 3)), times=rng.uniform(-0.1, 0.1, 5000))
+deskewed(scan, rng.normal(size=6))
+(_, p, p_labels, _), (_, q, q_labels, _) = list(simulate(12, 0, lidar=lidar))[::11]
 for config in (SgorConfig(), SgorConfig.paper(), SgorConfig.kitti_protocol(), SgorConfig.indoor()):
     config = config.replace(threads=1)
     for labels in ((p_labels, q_labels), (None, None)):
