@@ -13,6 +13,7 @@ from rosbags.typesys import get_typestore
 from rosbags.typesys import Stores
 from tqdm import tqdm
 
+from ..core.common import se3
 from ..core.common.settings import InputError
 from ..core.config import SgorConfig
 from ..evaluation.metrics.trajectory import require_evo
@@ -114,7 +115,9 @@ def _run(options: argparse.Namespace) -> int:
     recorded = recorded_drive(options.data, most) if options.data else None
     convention = (recorded or SgorConfig()).label_convention
     with closing(Domain()) as domain, NodeProcess(
-            domain, out / 'node.log', '-p', f'label_convention:={convention}') as node:
+            domain, out / 'node.log', '-p', f'label_convention:={convention}',
+            # the way back of a recorded drive has the very scans of the way there
+            '-p', f'loop_closure:={str(options.data is None).lower()}') as node:
         # while the node starts
         recorded = recorded or _built_in(options, most)
         drive = recorded.truth
@@ -195,10 +198,15 @@ def _compare(player: 'Player', truth: dict[int, Array], world: WorldMap, memory_
                         for stamp in stamps])
     latency = np.array([player.heard_s[stamp] - player.sent_s[stamp] for stamp in stamps])
     counts = list(told.values())[-1]
-    _say(report(len(sent), counts, seconds, latency, errors, memory_mb))
+    loops = [loop_of(message) for message in player.loops]
+    _say(report(len(sent), counts, seconds, latency, errors, memory_mb,
+                None if options.data else [
+                    np.linalg.norm((se3.inverse(truth[target]) @ truth[source] - T)[:3, 3])
+                    for target, source, T in loops]))
     if len(answered) < SWIFT_SHARE * len(sent):
         _say(slowness(len(answered), len(sent), seconds, options.rate))
-    plot_against_truth(out / 'trajectory.png', errors, np.array(list(truth.values())), world)
+    plot_against_truth(out / 'trajectory.png', errors, np.array(list(truth.values())), world,
+                       [(truth[target], truth[source]) for target, source, _ in loops])
     plot_errors(out / 'errors.png', errors, np.array(answered), seconds, 1 / options.rate)
     _say(f'pictures: {out}/trajectory.png, {out}/errors.png'
          + ('' if options.data else f'; bag: {out}/bag'))
@@ -221,7 +229,7 @@ def slowness(answered: int, sent: int, seconds: Array, rate: float) -> str:
 
 
 def report(sent: int, counts: dict[str, str], seconds: Array, latency: Array,
-           errors: TrackErrors, memory_mb: list[float]) -> str:
+           errors: TrackErrors, memory_mb: list[float], loop_errors_m: list[float] | None) -> str:
     """Return the table of the demo; `counts` is what the node told of the last scan."""
     drift = errors.drift
     rows = [
@@ -238,12 +246,22 @@ def report(sent: int, counts: dict[str, str], seconds: Array, latency: Array,
          if drift.stretches else 'the drive is too short'),
         (f'end of the track, after {errors.length_m:.0f} m',
          f'{errors.end_translation_m:.2f} m, {errors.end_rotation_deg:.2f} deg off'),
+        *([] if loop_errors_m is None else [('loops closed', str(len(loop_errors_m)) + (
+            f', off by {_spread(100 * np.array(loop_errors_m), "{:.1f} cm")}'
+            if loop_errors_m else ''))]),
         ('memory of the node', f'{memory_mb[0]:.0f} MB before, {memory_mb[-1]:.0f} MB after'),
     ]
     width = max(len(name) for name, _ in rows)
     rule = '-' * (width + 42)
     lines = [f'{name:<{width}}  {value}' for name, value in rows]
     return '\n'.join([rule, *lines, rule])
+
+
+def loop_of(message: Any) -> tuple[int, int, Array]:
+    """Return the stamps of target and source of a `loop_closure`, and T_target_source."""
+    target, source = (int(frame.rpartition('@')[2])
+                      for frame in (message.header.frame_id, message.child_frame_id))
+    return target, source, matrix_of(message.pose.pose)
 
 
 def _spread(values: Array, unit: str, percentiles: tuple[int, ...] = (50, 95)) -> str:

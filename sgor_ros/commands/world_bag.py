@@ -16,6 +16,7 @@ from ..io.messages import point_cloud2
 Array = NDArray[np.float64]
 
 STREET, SPEED_M_S = 'street', 8.0
+THERE_AND_BACK = 60
 # zero stands for "no stamp" in ROS
 FIRST_STAMP_NS = 1_000_000_000
 # of the points of every so many scans, every so many are the map
@@ -43,7 +44,7 @@ def write_world_bag(path: Path, scans: int, seed: int, place: str = STREET
     """Drive through the built-in world at 10 Hz and record it, replacing an older bag.
 
     The clouds are on `points`, the true poses on `ground_truth`; `place` is the street or a kind
-    of `world.scenes`.
+    of `world.scenes`. On the street the second half of a longer drive is the way back.
 
     Returns
     -------
@@ -64,7 +65,8 @@ def write_world_bag(path: Path, scans: int, seed: int, place: str = STREET
     truth: dict[int, Array] = {}
     points_seen, labels_seen = [], []
     speed = SPEED_M_S if place == STREET else None
-    drive = simulate(scans, seed, speed=speed, place=place)
+    drive = simulate(scans, seed, speed=speed, place=place,
+                     back=place == STREET and scans >= THERE_AND_BACK)
     with BagWriter(path) as bag:
         for seconds, points, labels, pose in tqdm(drive, 'recording', scans, unit='scan',
                                                   disable=None):

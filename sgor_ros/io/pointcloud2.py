@@ -25,7 +25,8 @@ LABEL_ROUNDING = 1e-3
 LARGEST_LABEL = 2.0**32
 
 
-def decode(message: Any, label_field: str, time_field: str = '') -> SemanticScan:
+def decode(message: Any, label_field: str, time_field: str = '', *, guessed: bool = False
+           ) -> SemanticScan:
     """Read the points and labels of a cloud.
 
     Parameters
@@ -37,6 +38,8 @@ def decode(message: Any, label_field: str, time_field: str = '') -> SemanticScan
         (see `label_field_of`).
     time_field : str
         Field with the time of each point; empty for none (see `time_field_of`).
+    guessed : bool
+        Whether nobody has named that field: what are no times is left alone then.
 
     Raises
     ------
@@ -53,9 +56,18 @@ def decode(message: Any, label_field: str, time_field: str = '') -> SemanticScan
         points[:, axis] = records[name]
     labels = whole_numbers(records[label_field], points,
                            f'field {label_field}') if label_field else None
-    times = seconds_since(stamp_ns_of(message.header), records[time_field],
-                          time_field) if time_field else None
-    return SemanticScan(points, labels, times=times)
+    return SemanticScan(points, labels, times=(
+        _times(message, records[time_field], time_field, guessed) if time_field else None))
+
+
+def _times(message: Any, values: NDArray[Any], name: str, guessed: bool
+           ) -> NDArray[np.float64] | None:
+    try:
+        return seconds_since(stamp_ns_of(message.header), values, name)
+    except InputError:
+        if guessed:
+            return None
+        raise
 
 
 def _records(message: Any, names: tuple[str, ...]) -> NDArray[Any]:

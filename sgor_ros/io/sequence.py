@@ -92,4 +92,4 @@ def scan_of_cloud(message: Any, label_field: str, arrived_ns: int,
 
 def _decoded(message: Any, label_field: str, time_field: str) -> SemanticScan:
     return decode(message, label_field_of(message, label_field),
-                  time_field_of(message, time_field))
+                  time_field_of(message, time_field), guessed=time_field == AUTO)

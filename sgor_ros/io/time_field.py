@@ -6,11 +6,12 @@ from numpy.typing import NDArray
 
 from ..core.common.settings import InputError
 from .label_field import AUTO
-from .label_field import field_names
 from .label_field import NONE
 
 TIME_FIELDS = ('t', 'time', 'timestamp', 'time_stamp', 'offset_time')
 """In this order: Ouster; Velodyne; Hesai, RoboSense and Livox; others; Livox's own message."""
+NUMBERS = (5, 6, 7, 8)
+"""Datatypes of sensor_msgs/msg/PointField that have room for times."""
 UNITS = (1.0, 1e-3, 1e-6, 1e-9)
 SHORTEST_S, LONGEST_S = 0.002, 2.0
 """A sweep takes so long: by that the unit is known, for from one to the next it is as many times.
@@ -33,7 +34,8 @@ def time_field_of(message: Any, wanted: str) -> str:
         return ''
     if wanted != AUTO:
         return wanted
-    there = field_names(message)
+    there = [field.name for field in message.fields
+             if field.datatype in NUMBERS and field.count == 1]
     return next((name for name in TIME_FIELDS if name in there), '')
 
 

@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from . import scenes
 from .lidar import Lidar
+from .return_trip import there_and_back
 from .scene import Scene
 from .street import loop_trajectory
 from .street import street_scene
@@ -19,11 +20,12 @@ STREET = 'street'
 _LIDAR = Lidar()
 _PERIOD = 0.1  # s
 _SPEED = 6.0  # m/s
+_LANE, _TURN = 2.6, 20  # m, scans
 
 
 def simulate(
     n_scans: int, seed: int = 0, lidar: Lidar = _LIDAR, speed: float | None = None,
-    place: str = STREET,
+    place: str = STREET, back: bool = False,
 ) -> Iterator[tuple[
     float, npt.NDArray[np.float32], npt.NDArray[np.uint32], npt.NDArray[np.float64],
 ]]:
@@ -41,6 +43,8 @@ def simulate(
         Speed, m/s; if not given 6 on the street, and what a kind of place is made for.
     place : str
         'street', or one of `scenes.KINDS`.
+    back : bool
+        Whether the second half of the scans is the way back, in the other lane: street only.
 
     Yields
     ------
@@ -57,7 +61,10 @@ def simulate(
     scene: Scene
     if place == STREET:
         scene = street = street_scene(seed)
-        poses = loop_trajectory(street, n_scans, _SPEED if speed is None else speed, _PERIOD)
+        forth = (n_scans - _TURN) // 2 if back else n_scans
+        poses = loop_trajectory(street, forth, _SPEED if speed is None else speed, _PERIOD)
+        if back:
+            poses = there_and_back(poses, _LANE, n_scans - 2 * forth)
     else:
         scene = there = scenes.make(place, seed)
         step = scenes.KINDS[place].step if speed is None else speed * _PERIOD

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ...io.colours import CLASSES
 from ...io.colours import ESTIMATE
 from ...io.colours import GROUND
+from ...io.colours import INLIER
 from ...io.colours import LIMIT
 from ...io.colours import LOST
 from ...io.colours import SERIES
@@ -104,7 +105,7 @@ def plot_track(path: str | Path, title: str, stamps_s: Sequence[float],
 
 
 def plot_against_truth(path: Path, errors: TrackErrors, T_world_sensor: Array,
-                       world: LabelledPoints) -> None:
+                       world: LabelledPoints, loops: Sequence[tuple[Array, Array]] = ()) -> None:
     """Draw truth and track from above.
 
     Parameters
@@ -116,6 +117,8 @@ def plot_against_truth(path: Path, errors: TrackErrors, T_world_sensor: Array,
         The truth, of all scans.
     world : LabelledPoints
         The surroundings in the frame of the truth.
+    loops : sequence of pairs of (4, 4) array
+        True poses of both scans of each loop that was closed.
     """
     truth, estimate = T_world_sensor[:, :2, 3], errors.estimate[:, :2, 3]
     both = np.vstack((truth, estimate))
@@ -126,6 +129,9 @@ def plot_against_truth(path: Path, errors: TrackErrors, T_world_sensor: Array,
     _draw_world(axes, world, low, high)
     axes.plot(*truth.T, '-', color=TRUTH, lw=3.5, label='ground truth')
     _draw_track(axes, estimate, 1.2)
+    for number, loop in enumerate(loops):
+        axes.plot(*np.array(loop)[:, :2, 3].T, '-', color=INLIER, lw=1.5, zorder=4,
+                  label='' if number else f'{len(loops)} loops closed')
     _draw_ends(axes, truth)
     _frame(axes, low, high)
     _title(axes, f'{len(estimate)} of {len(truth)} scans, {errors.length_m:.0f} m: drift '

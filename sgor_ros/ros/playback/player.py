@@ -42,6 +42,7 @@ class Player:
     Attributes
     ----------
     odometry : list of nav_msgs/msg/Odometry
+    loops : list of nav_msgs/msg/Odometry
     diagnostics : list of diagnostic_msgs/msg/DiagnosticArray
     sent_s, heard_s : dict of int to float
         Stamp of the scan to the moment its cloud was sent and its odometry heard, monotonic.
@@ -59,10 +60,13 @@ class Player:
         self._points = self.node.create_publisher(
             PointCloud2, namespace + 'points', QoSProfile(depth=DEPTH, reliability=reliability))
         self.odometry: list[Odometry] = []
+        self.loops: list[Odometry] = []
         self.diagnostics: list[DiagnosticArray] = []
         self.sent_s: dict[int, float] = {}
         self.heard_s: dict[int, float] = {}
         self.node.create_subscription(Odometry, self._odometry_topic, self._on_odometry, 100)
+        self.node.create_subscription(Odometry, namespace + 'loop_closure', self.loops.append,
+                                      100)
         self.node.create_subscription(DiagnosticArray, '/diagnostics', self.diagnostics.append,
                                       100)
 
