@@ -82,11 +82,13 @@ say "making $venv (one to three minutes)"
 "$python" -m venv --clear "${options[@]}" "$venv"
 "$venv/bin/python" -m pip install -qq --disable-pip-version-check uv ||
     say 'no uv: pip takes some minutes more'
-install --editable ".[$extras]" "${pins[@]}"
+# of the kind that type checkers and IDEs find: a path, and no import hook
+editable=(--config-settings editable_mode=compat --editable)
+install "${editable[@]}" ".[$extras]" "${pins[@]}"
 install 'gtsam>=4.3' g2opy "${pins[@]}" ||
     say 'no GTSAM or g2o for this machine: loops are not closed, and their tests are skipped'
 if [ "${#pins[@]}" -eq 0 ]; then
-    install --editable '.[visualize]' ||
+    install "${editable[@]}" '.[visualize]' ||
         say 'no rerun for this machine: the tests of --visualize are skipped'
     say 'building tf2_msgs for the tests of /tf (a minute)'
     bash scripts/tf2_msgs.sh "$venv/bin/python" "$venv/tf2_msgs" ||

@@ -8,9 +8,18 @@ With loops and a map: `Mapper`, `MapperConfig`, `MappedScan`, `Loop`, `Trajector
 Maps that stay: `Map`, `Located`, `Place`, `Merged`.
 Data sets: `open_drive`, `open_drives`, `Drive`.
 
+The five calls:
+
+    prepared = preprocess(SemanticScan(points, labels))       # what depends on one scan alone
+    result = register(source, target)                         # scans, prepared ones, or arrays
+    if result.success: moved = result.transform(points)       # T_target_source, else result.reason
+    tracked = Tracker().track(scan, stamp_ns)                 # scan after scan: T_odom_sensor
+    for scan in open_drive(path): scan.read(), scan.stamp_ns  # folders and bags
+
 Importing it loads and changes nothing; compiled code is loaded with the first of these names.
 """
 from importlib import import_module
+from types import ModuleType
 from typing import Any
 from typing import TYPE_CHECKING
 
@@ -49,5 +58,7 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    """Return what there is, with what is loaded when it is asked for: help and completion ask."""
-    return sorted({*globals(), *__getattr__('__all__')})
+    """Return the interface, of which help and completion ask, and the modules that are loaded."""
+    own = (name for name, value in globals().items()
+           if name.startswith('__') or isinstance(value, ModuleType))
+    return sorted({*own, *__getattr__('__all__'), '__version__'})

@@ -5,7 +5,6 @@ from argparse import Namespace
 from argparse import RawDescriptionHelpFormatter
 from collections.abc import Callable
 from importlib import metadata
-import os
 import signal
 import sys
 from textwrap import fill
@@ -16,6 +15,7 @@ from typing import Any
 from typing import NoReturn
 
 from ..core.common.settings import InputError
+from ..io import standard_streams
 
 OK = 0
 FAILED = 1
@@ -62,6 +62,7 @@ class Parser(ArgumentParser):
     def __init__(self, prog: str, usage: str = '', description: str = '',
                  examples: tuple[str, ...] = (), done: str = 'done', failed: str = '',
                  **others: object) -> None:
+        standard_streams.fill_gaps()
         codes = {OK: done, **({FAILED: failed} if failed else {}), **CODES}
         epilog = '\n'.join((
             'examples:', *(f'  {line}' for line in examples),
@@ -69,6 +70,13 @@ class Parser(ArgumentParser):
         super().__init__(prog=prog, usage=f'{prog} {usage}', epilog=epilog,
                          description=fill(description, HELP_WIDTH), formatter_class=_Formatter)
         self.add_argument('--version', action='version', version=f'sgor_ros {version()}')
+
+    def exit(self, status: int = OK, message: str | None = None) -> NoReturn:
+        """End, with a message on stderr; help that nobody reads to its end is no error."""
+        with standard_streams.not_needed():
+            if message:
+                sys.stderr.write(message)
+        sys.exit(status)
 
     def error(self, message: str) -> NoReturn:
         """Tell what is wrong and how it goes, and end."""
@@ -167,7 +175,7 @@ def _judged(error: Exception) -> int:
         return _end(REFUSED, str(error))
     if isinstance(error, BrokenPipeError):
         # whoever read has had enough, as `head` does: nobody is left to tell
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        standard_streams.forget()
         return UNHEARD
     if isinstance(error, OSError):
         return _end(BROKE_OFF, str(error))
@@ -178,5 +186,6 @@ def _judged(error: Exception) -> int:
 
 
 def _end(code: int, message: str) -> int:
-    print(f'error: {message}', file=sys.stderr)
+    with standard_streams.not_needed():
+        print(f'error: {message}', file=sys.stderr)
     return code

@@ -15,14 +15,24 @@ from ..core.common.settings import Settings
 from ..core.config import SgorConfig
 from ..visualize import VIEWER
 
-PRESETS = {'outdoor': SgorConfig.outdoor, 'indoor': SgorConfig.indoor, 'paper': SgorConfig.paper,
+INDOOR = 'indoor'
+PRESETS = {'outdoor': SgorConfig.outdoor, INDOOR: SgorConfig.indoor, 'paper': SgorConfig.paper,
            'kitti_protocol': SgorConfig.kitti_protocol}
 
 
 def add_preset(to: ArgumentParser) -> None:
     """Add the option for the settings to start from."""
-    to.add_argument('--preset', choices=list(PRESETS), default='outdoor',
-                    help='settings of the registration to start from')
+    shown = [name for name in PRESETS if name != INDOOR]
+    to.add_argument('--preset', choices=list(PRESETS), default='outdoor', type=_preset,
+                    metavar=f'{{{",".join(shown)}}}',
+                    help='settings of the registration to start from; outdoor is for any space')
+
+
+def _preset(name: str) -> str:
+    if name == INDOOR:
+        print('warning: --preset indoor is deprecated: without it, the scale of a space is found '
+              'from the scans, and more of them register', file=sys.stderr)
+    return name
 
 
 def add_settings(to: ArgumentParser, title: str, config: type[Settings]) -> None:

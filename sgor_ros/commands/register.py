@@ -1,13 +1,11 @@
 """`sgor_register`: two scans from files, the transformation between them."""
 from argparse import Namespace
-from dataclasses import asdict
 from dataclasses import replace
 import json
 import math
 from pathlib import Path
 import sys
 import time
-from typing import Any
 
 import numpy as np
 
@@ -25,6 +23,7 @@ from ..io.plots import plot_registration
 from ..io.scans import read_scan
 from ..io.writing import check_file
 from ..io.writing import new_file
+from ..io.writing import STDOUT
 from .command_line import FAILED
 from .command_line import OK
 from .command_line import Parser
@@ -63,10 +62,15 @@ def register_files(arguments: Namespace) -> int:
         **result.timings, 'preprocessing': preprocessing + result.timings['preprocessing']})
     for warning in result.warnings:
         print(f'warning: {warning}', file=sys.stderr)
-    print(_text(result))
-    if arguments.json:
+    document = json.dumps({'source': str(arguments.source), 'target': str(arguments.target),
+                           **result.to_dict()}, indent=2) + '\n'
+    to_stdout = arguments.json == STDOUT
+    print(_text(result), file=sys.stderr if to_stdout else sys.stdout)
+    if to_stdout:
+        sys.stdout.write(document)
+    elif arguments.json:
         with new_file(arguments.json) as place:
-            place.write_text(json.dumps(_as_dict(result, arguments), indent=2) + '\n')
+            place.write_text(document)
     if arguments.plot:
         _plot(arguments, source, target, result)
     if arguments.visualize is not None:
@@ -80,7 +84,7 @@ def _parser() -> Parser:
         'sgor_register', 'SOURCE TARGET [options]', 'Register two scans without an initial guess '
         'and print T_target_source, which maps points of the source into the target.',
         ('sgor_register a.bin b.bin --source-labels a.label --target-labels b.label',
-         'sgor_register a.ply b.ply --preset indoor --json result.json --plot pair.png'),
+         'sgor_register a.ply b.ply --json result.json --plot pair.png'),
         'registered', 'not registered; the reason is told')
     command.add_argument('source', type=Path, help='.bin, .pcd, .ply or .npz')
     command.add_argument('target', type=Path, help='likewise')
@@ -91,7 +95,7 @@ def _parser() -> Parser:
                          help='where the labels of the target mean something else')
     add_preset(command)
     command.add_argument('--json', type=Path, metavar='FILE', help='write the result to; an older '
-                         'file is replaced')
+                         'file is replaced; -: to standard output, and all else to stderr')
     command.add_argument('--plot', type=Path, metavar='FILE', help='draw the result to '
                          f'({", ".join(PICTURES)}), likewise')
     add_visualize(command)
@@ -107,7 +111,7 @@ def _check_outputs(arguments: Namespace) -> None:
               if path is not None]
     for option, path, endings in (('--json', arguments.json, ()),
                                   ('--plot', arguments.plot, PICTURES)):
-        if path is None:
+        if path is None or (option == '--json' and path == STDOUT):
             continue
         check_file(path, option, endings)
         if path.resolve() in inputs:
@@ -135,23 +139,6 @@ def _text(result: Registration) -> str:
     lines.append(f'took {1e3 * sum(result.timings.values()):.0f} ms, '
                  f'{1e3 * result.timings["preprocessing"]:.0f} of them to preprocess both scans')
     return '\n'.join(lines)
-
-
-def _as_dict(result: Registration, arguments: Namespace) -> dict[str, Any]:
-    T, covariance = result.T_target_source, result.covariance
-    return {
-        'source': str(arguments.source), 'target': str(arguments.target),
-        'success': result.success, 'status': result.status.value, 'reason': result.reason,
-        'confidence': result.confidence,
-        # a refused candidate is nothing to build on; one of several, or one that slides, may be
-        'T_target_source': T.tolist() if T is not None and (
-            result.success or len(result.degenerate) or result.alternatives) else None,
-        'covariance': None if covariance is None else covariance.tolist(),
-        'degenerate': result.degenerate.tolist(),
-        'alternatives': [other.T_target_source.tolist() for other in result.alternatives],
-        'correspondences': len(result.inliers), 'inliers': int(result.inliers.sum()),
-        'score': None if result.score is None else asdict(result.score),
-        'warnings': list(result.warnings), 'timings_s': result.timings}
 
 
 def _plot(arguments: Namespace, source: SemanticScan, target: SemanticScan,

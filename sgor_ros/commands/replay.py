@@ -2,6 +2,7 @@
 from argparse import Namespace
 from contextlib import ExitStack
 from contextlib import nullcontext
+from importlib.util import find_spec
 from pathlib import Path
 import sys
 from typing import TYPE_CHECKING
@@ -14,6 +15,7 @@ from ..core.common.settings import InputError
 from ..core.config import SgorConfig
 from ..core.scan.labels import label_convention
 from ..core.warmup import warm_up
+from ..evaluation.metrics.trajectory import require_evo
 from ..io.bags import BagReader
 from ..io.bags import BagWriter
 from ..io.bags import is_bag
@@ -23,6 +25,7 @@ from ..io.label_field import AUTO
 from ..io.label_field import NONE
 from ..io.sequence import ScanSequence
 from ..io.stream_config import StreamConfig
+from ..io.trajectories import read_timed_poses
 from ..io.writing import free_folder
 from ..io.writing import new_folder
 from ..mapping import Mapper
@@ -49,6 +52,10 @@ from .replay_results import print_results
 from .replay_results import summary_of
 from .replay_results import Warnings
 from .replay_results import write_results
+from .replay_truth import compared
+from .replay_truth import true_poses
+from .replay_truth import Truth
+from .replay_truth import WITHOUT_EVO
 
 if TYPE_CHECKING:
     from ..visualize.track import TrackView
@@ -69,6 +76,9 @@ def replay(arguments: Namespace) -> int:
                          'up, so it needs T_base_sensor')
     if arguments.visualize is not None:
         visualize.check(arguments.visualize)
+    if arguments.truth is not None:
+        require_evo()
+        read_timed_poses(arguments.truth)    # what is no truth is told before the work
     with ExitStack() as stack:
         sequence = open_sequence(arguments, stream, stack)
         start = PRESETS[arguments.preset]()
@@ -84,6 +94,8 @@ def replay(arguments: Namespace) -> int:
         place = stack.enter_context(new_folder(output))
         place.mkdir()
         warnings = Warnings()
+        for text in sequence.warnings:
+            warnings.add(text)
         with BagWriter(place / 'bag') if arguments.bag else nullcontext() as writer:
             warm_up(tracker.config)
             view = (None if arguments.visualize is None else stack.enter_context(
@@ -91,16 +103,17 @@ def replay(arguments: Namespace) -> int:
             pipeline = Pipeline(mapper or tracker, stream, BagSink(writer) if writer else None,
                                 mount)
             rows, broken = run_sequence(sequence, pipeline, view, warnings)
+        T_base_sensor = np.eye(4) if mount is None else mount(0, '')
+        assert not isinstance(T_base_sensor, str), 'it is fixed'
+        truth = _truth(arguments, sequence, rows, warnings)
         summary = summary_of(rows, warnings.texts, arguments.bag_path, sequence.name, tracker,
                              stream)
+        summary['truth'], shown = compared(rows, truth, T_base_sensor)
         title = f'{arguments.bag_path.name} {sequence.name}'
         if mapper is not None:
-            T_base_sensor = np.eye(4) if mount is None else mount(0, '')
-            assert not isinstance(T_base_sensor, str), 'it is fixed'
             mapper.finish()
-            summary['map'] = write_map(place, mapper, rows, T_base_sensor,
-                                       sequence.T_world_sensor, title)
-        write_results(place, rows, summary, title)
+            summary['map'] = write_map(place, mapper, rows, T_base_sensor, truth, title)
+        write_results(place, rows, summary, title, shown)
     print_results(summary, output)
     if broken:
         raise InputError(f'after {len(rows)} scans: {broken}')
@@ -121,6 +134,19 @@ def open_sequence(arguments: Namespace, stream: StreamConfig, stack: ExitStack) 
         raise InputError(f'label_field = {stream.label_field!r}: only the clouds of a bag have '
                          f'fields; for a folder it is {AUTO} or {NONE}')
     return drive if stream.label_field == AUTO else drive.without_labels()
+
+
+def _truth(arguments: Namespace, sequence: ScanSequence, rows: list[Row], warnings: Warnings
+           ) -> Truth:
+    """Return the true poses; those that do not fit cost no results."""
+    try:
+        truth = true_poses(arguments.truth, sequence, rows)
+    except InputError as error:
+        warnings.add(str(error))
+        return [None] * len(rows)
+    if find_spec('evo') is None and any(T is not None for T in truth):
+        warnings.note(WITHOUT_EVO)
+    return truth
 
 
 def run_sequence(sequence: ScanSequence, pipeline: Pipeline, view: 'TrackView | None',
@@ -166,6 +192,9 @@ def _parser() -> Parser:
     command.add_argument('--output', type=Path, metavar='FOLDER',
                          help='for the results, must not exist; default: out/NAME_replay with the '
                          'name of the bag, and _2, _3, ... behind it where that exists')
+    command.add_argument('--truth', type=Path, metavar='FILE', help='true poses of the sensor, '
+                         'TUM (by time) or KITTI (a line for each scan), to compare with; '
+                         'default: those that come with the data')
     command.add_argument('--bag', action='store_true',
                          help='also write a bag with /pose, /odometry and /correspondences')
     command.add_argument('--loops', action='store_true', help='close loops: also write corrected '

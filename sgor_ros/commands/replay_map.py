@@ -1,4 +1,5 @@
 """What `sgor_replay --loops` writes beside the results of odometry: graph, map, trajectories."""
+from collections.abc import Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -23,7 +24,7 @@ Array = NDArray[np.float64]
 
 
 def write_map(folder: Path, mapper: Mapper, rows: list[Row], T_base_sensor: Array,
-              T_world_sensor: Array | None, title: str) -> dict[str, Any]:
+              T_world_sensor: Sequence[Array | None], title: str) -> dict[str, Any]:
     """Write all of it into a folder, and return what the summary says of it.
 
     Parameters
@@ -34,7 +35,7 @@ def write_map(folder: Path, mapper: Mapper, rows: list[Row], T_base_sensor: Arra
         Of all scans, in their order.
     T_base_sensor : (4, 4) array
         The trajectories are those of the base.
-    T_world_sensor : (N, 4, 4) array or None
+    T_world_sensor : sequence of (4, 4) array or None
         True poses of the scans, where they are known.
     title : str
         Of the picture.
@@ -69,8 +70,9 @@ def write_map(folder: Path, mapper: Mapper, rows: list[Row], T_base_sensor: Arra
     if not mapper.graph.missing and mapper.graph.loops:
         chi_squared, freedom = mapper.graph.chi_squared()
         summary['chi_squared_per_degree_of_freedom'] = round(chi_squared / max(freedom, 1), 3)
-    if T_world_sensor is not None and find_spec('evo') is not None:
-        truth = {row.stamp_ns: T for row, T in zip(rows, T_world_sensor, strict=False)}
+    if any(T is not None for T in T_world_sensor) and find_spec('evo') is not None:
+        truth = {row.stamp_ns: T for row, T in zip(rows, T_world_sensor, strict=True)
+                 if T is not None}
         known = [i for i, stamp in enumerate(stamps_ns) if after.part[i] == parts[0]
                  and stamp in truth]
         true = np.array([se3.inverse(truth[stamps_ns[known[0]]]) @ truth[stamps_ns[i]]

@@ -1,4 +1,5 @@
 """What `sgor_replay` writes and says of a drive: trajectories, summary, picture, warnings."""
+from collections import Counter
 from dataclasses import asdict
 import json
 import math
@@ -7,6 +8,7 @@ import sys
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from tqdm import tqdm
 
 from ..evaluation.report.track_plots import plot_track
@@ -17,6 +19,7 @@ from ..io.trajectories import write_tum
 from ..pipeline.outcome import Outcome
 from ..pipeline.outcome import Row
 from ..tracker import Tracker
+from .replay_truth import in_words
 
 # then the terminal has seen enough; summary.json has them all
 PRINTED_WARNINGS = 20
@@ -67,6 +70,8 @@ def summary_of(rows: list[Row], warnings: list[str], path: Path, topic: str, tra
         'failures': [{'scan': i, 'stamp_ns': row.stamp_ns, 'reason': row.reason}
                      for i, row in enumerate(rows) if row.T_odom_child is None],
         # the first scan of all is one of them
+        'tracks': [{'id': track, 'scans': count} for track, count in Counter(
+            row.track_id for row in rows if row.T_odom_child is not None).items()],
         'restarts': [i for i, row in enumerate(rows) if row.restarted],
         'timings_ms': {
             'total': _statistics([row.seconds for row in rows]),
@@ -84,14 +89,22 @@ def _statistics(seconds: list[float]) -> dict[str, float]:
             'p95': round(float(np.percentile(taken, 95)), 3)}
 
 
-def write_results(output: Path, rows: list[Row], summary: dict[str, Any], title: str) -> None:
-    """Write trajectories, summary and picture into a folder."""
-    stamps_ns, poses = [row.stamp_ns for row in rows], [row.T_odom_child for row in rows]
-    write_tum(output / 'trajectory.tum', stamps_ns, poses)
-    write_kitti(output / 'trajectory_kitti.txt', poses)
+def write_results(output: Path, rows: list[Row], summary: dict[str, Any], title: str,
+                  truth: dict[int, NDArray[np.float64]]) -> None:
+    """Write trajectories, summary and picture into a folder.
+
+    Each track has a frame of its own, and so files of its own; `truth` has true poses by track.
+    """
+    stamps_ns = [row.stamp_ns for row in rows]
+    for number, track in enumerate(summary['tracks'], 1):
+        ending = f'_{number}' * (number > 1)
+        poses = [row.T_odom_child if row.track_id == track['id'] else None for row in rows]
+        write_tum(output / f'trajectory{ending}.tum', stamps_ns, poses)
+        write_kitti(output / f'trajectory_kitti{ending}.txt', poses)
     (output / 'summary.json').write_text(json.dumps(summary, indent=2) + '\n')
-    plot_track(output / 'trajectory.png', title, [stamp * 1e-9 for stamp in stamps_ns], poses,
-               [row.seconds for row in rows], [row.confidence for row in rows])
+    plot_track(output / 'trajectory.png', title, [stamp * 1e-9 for stamp in stamps_ns],
+               [row.T_odom_child for row in rows], [row.seconds for row in rows],
+               [row.confidence for row in rows], [row.track_id for row in rows], truth)
 
 
 def print_results(summary: dict[str, Any], output: Path) -> None:
@@ -102,6 +115,12 @@ def print_results(summary: dict[str, Any], output: Path) -> None:
         error = (f'; APE {told["ape_before_m"]:.2f} m before, {told["ape_after_m"]:.2f} m after'
                  if 'ape_after_m' in told else '')
         print(f'{len(told["loops"])} loops closed among {told["nodes"]} nodes{error}')
+    for line in in_words(summary['truth']):
+        print(line)
+    if (tracks := len(summary['tracks'])) > 1:
+        print(f'{tracks} tracks, each in a frame of its own: trajectory.tum is the first, '
+              f'trajectory_2.tum the second'
+              + (f', up to trajectory_{tracks}.tum' if tracks > 2 else ''))
     print(f'{summary["successes"]} of {summary["scans"]} scans have a pose; time per scan: median '
           f'{total["median"]:.0f} ms, p95 {total["p95"]:.0f} ms\n'
           f'wrote {output}: {", ".join(sorted(path.name for path in output.iterdir()))}')

@@ -37,6 +37,7 @@ from ..evaluation.runner import run
 from ..io.datasets import Drive
 from ..io.datasets import DriveScan
 from ..io.datasets import open_drives
+from ..io.writing import STDOUT
 from . import command_line
 from .benchmarks import inputs
 
@@ -98,6 +99,8 @@ def _parser() -> command_line.Parser:
 
 def _tables(arguments: Namespace) -> int:
     output: Path = arguments.output or Path('out') / arguments.protocol
+    if output == STDOUT:
+        raise InputError('--output -: a folder is written, which standard output cannot take')
     protocol = PROTOCOLS[arguments.protocol](arguments)
     if not protocol.pairs:
         raise InputError(f'no pair of {protocol.name} in {arguments.data or "the built-in world"}'
@@ -114,10 +117,18 @@ def _tables(arguments: Namespace) -> int:
     warm_up(protocol.front_end)
     features = None if arguments.features is None else Features(arguments.features)
     rows = run(protocol, methods, output, features=features,
-                  variants=studies.variants(study, arguments.values, arguments.seed),
-                  processes=arguments.processes, dask=arguments.dask)
+               variants=studies.variants(study, arguments.values, arguments.seed),
+               processes=arguments.processes, dask=arguments.dask, data=_data(arguments))
+    inputs.say(page.keep_earlier(output, rows))
     print(page.write(output, rows, protocol, methods, study, features))
     return command_line.OK
+
+
+def _data(arguments: Namespace) -> str:
+    """Return what the pairs are of; their names alone do not tell."""
+    if arguments.data is None:
+        return f'built-in world, seed {arguments.seed}, {arguments.scans} scans'
+    return str(arguments.data.resolve())
 
 
 def _methods(arguments: Namespace, protocol: Protocol) -> list[Method]:

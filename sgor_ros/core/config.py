@@ -99,7 +99,11 @@ class SgorConfig(Ablation):
 
     @classmethod
     def indoor(cls) -> Self:
-        """Return a preset for rooms and fragments of a few metres, for who wants it fixed."""
+        """Return a preset for matches of rooms, which have no clouds to find the scale from.
+
+        For `register_correspondences`, and protocols that fix it. Of scans the default finds the
+        scale, and registers more of them.
+        """
         return cls(
             scale=1.0, min_range=0.0, max_range=20.0, voxel_size=0.05, sigma_g=0.03,
             normal_radius=0.10, descriptor_radius=0.25, vote_radius=0.10, context_scale=0.15,

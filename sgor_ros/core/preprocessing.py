@@ -145,7 +145,7 @@ def _prepare(scan: SemanticScan, asked: SgorConfig, given: Given | None,
         warnings.append('no ground plane found: no ground check')
     else:
         features = _over_ground(features, ground, convention, config)
-        if ground.source == 'geometry':
+        if ground.source == 'geometry' and features.labelled_share > 0:
             warnings.append('no ground labels: ground plane found by geometry')
     with clock('index'):
         index = scan_index(ranges, features, directions,

@@ -3,6 +3,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from dataclasses import replace
 from functools import partial
+from typing import cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -39,6 +40,7 @@ from .verdict.decision import refuse
 from .verdict.hints import frame_hint
 from .verdict.hints import scale_hint
 from .verdict.result import Registration
+from .verdict.result import Result
 
 Scan = SemanticScan | PreparedScan
 
@@ -60,7 +62,7 @@ class Attempt:
 
 
 def register(source: Scan | ArrayLike, target: Scan | ArrayLike,
-             config: SgorConfig | None = None) -> Registration:
+             config: SgorConfig | None = None) -> Result:
     """Find the transformation between two overlapping scans, without an initial guess.
 
     Parameters
@@ -99,7 +101,8 @@ def register(source: Scan | ArrayLike, target: Scan | ArrayLike,
             with clock('verdict'):
                 result = decide(pair, found.test, alignment, config)
         hints = _hints(result, one, other, config)
-    return replace(result, warnings=(*result.warnings, *hints)) if hints else result
+    return cast('Result', replace(result, warnings=(*result.warnings, *hints)) if hints
+                else result)
 
 
 def _configuration(source: Scan, target: Scan, asked: SgorConfig | None) -> SgorConfig:
@@ -235,7 +238,7 @@ def register_correspondences(source_points: ArrayLike, target_points: ArrayLike,
                              source_labels: ArrayLike | None = None,
                              target_labels: ArrayLike | None = None, *,
                              ground_normals: Normals | None = None,
-                             config: SgorConfig | None = None) -> Registration:
+                             config: SgorConfig | None = None) -> Result:
     """Find the transformation behind matches from elsewhere.
 
     Parameters
@@ -259,4 +262,4 @@ def register_correspondences(source_points: ArrayLike, target_points: ArrayLike,
         correspondences = given_correspondences(source_points, target_points, source_labels,
                                                 target_labels, config)
         solution = solve(correspondences, ground_normals, None, config, clock)
-        return decide_by_matches(solution, config, clock.seconds)
+        return cast('Result', decide_by_matches(solution, config, clock.seconds))

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .config import SgorConfig
+from .execution.compiling import drop_damaged
 from .execution.compiling import loading_only
 from .execution.compiling import NotCompiledError
 from .execution.compiling import tell
@@ -28,8 +29,8 @@ from .scan.scan import SemanticScan
 def warm_up(config: SgorConfig | None = None) -> None:
     """Compile what is not compiled yet, so that the first real scan does not wait.
 
-    Registers a small made-up scene to itself. In a fresh environment that takes a quarter of a
-    minute or so, and the logger ``sgor_ros`` says it; afterwards, less than a second.
+    Registers a small made-up scene to itself. In a fresh environment that takes about half a
+    minute, and the logger ``sgor_ros`` says it; afterwards, less than a second.
 
     Parameters
     ----------
@@ -44,13 +45,20 @@ def warm_up(config: SgorConfig | None = None) -> None:
 
 
 def compiled(config: SgorConfig | None = None) -> bool:
-    """Return whether `warm_up` has nothing to compile; what there is in the cache is loaded."""
+    """Return whether `warm_up` has nothing to compile; what there is in the cache is loaded.
+
+    What is damaged there is removed, so that it is compiled again.
+    """
     try:
         with loading_only():
             # one thread: the others would compile
             _register_all((config or SgorConfig()).replace(threads=1))
     except NotCompiledError:
         return False
+    except Exception:
+        if drop_damaged():
+            return False
+        raise
     return True
 
 

@@ -40,7 +40,8 @@ def run_pairs(pairs: Sequence[Pair], methods: Sequence[Method], seed: int) -> li
 
 def run(protocol: Protocol, methods: Sequence[Method], folder: Path | None = None, *,
         variants: Sequence[Variant] = (Variant(),), features: Features | None = None,
-        turn_seed: int | None = None, processes: int = 1, dask: str = '') -> list[Row]:
+        turn_seed: int | None = None, processes: int = 1, dask: str = '',
+        data: str = '') -> list[Row]:
     """Run all methods on all pairs, in an order that changes from pair to pair.
 
     Parameters
@@ -60,6 +61,8 @@ def run(protocol: Protocol, methods: Sequence[Method], folder: Path | None = Non
         On this machine.
     dask : str
         Address of a scheduler, to run on its workers instead.
+    data : str
+        What the pairs are of: rows of other data are not taken for theirs.
 
     Returns
     -------
@@ -76,7 +79,7 @@ def run(protocol: Protocol, methods: Sequence[Method], folder: Path | None = Non
     done: dict[tuple[str, str, str], Row] = {}
     if folder is not None and path is not None:
         folder.mkdir(parents=True, exist_ok=True)
-        _same_setup(folder / 'setup.json', protocol, features)
+        _same_setup(folder / 'setup.json', protocol, features, data)
         done = _by_key(table.read(path, protocol.thresholds[0]))
         # what was cut off in the middle of a line goes
         path.write_text(','.join(table.MATCH_COLUMNS) + '\n' + table.lines(done.values()))
@@ -144,16 +147,17 @@ def _call(job: Job) -> list[Row]:
     return job()
 
 
-def _same_setup(path: Path, protocol: Protocol, features: Features | None) -> None:
+def _same_setup(path: Path, protocol: Protocol, features: Features | None, data: str) -> None:
     # methods and variants may be added to a run; what rows depend on may not change
     setup = {'protocol': protocol.name, 'inlier_m': protocol.inlier_m,
-             'features': '' if features is None else str(features.folder),
+             'data': data, 'features': '' if features is None else str(features.folder),
              'front_end': asdict(protocol.front_end)}
     if path.is_file():
-        before = json.loads(path.read_text())
-        if before['run'] != json.loads(json.dumps(setup)):
-            raise InputError(f'{path.parent}: holds a run with other settings; take another '
-                             'folder or remove it')
+        before, now = json.loads(path.read_text())['run'], json.loads(json.dumps(setup))
+        # what older runs do not tell cannot be compared
+        if changed := [key for key, value in now.items() if before.get(key, value) != value]:
+            raise InputError(f'{path.parent}: holds a run with another {", ".join(changed)}; take '
+                             'another folder or remove it')
         return
     beside = path.with_suffix('.part')
     document = {'run': setup, **describe_run()}

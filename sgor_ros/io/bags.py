@@ -6,6 +6,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+import sys
 from types import TracebackType
 from typing import Any
 from typing import Self
@@ -29,12 +30,39 @@ from .messages import matrix_of
 from .writing import new_folder
 from .writing import refuse_existing
 
+# as rosbags has it
+if sys.version_info >= (3, 14):
+    from compression import zstd
+else:
+    from backports import zstd
+
 MENDS = {'.mcap': 'mcap recover', '.bag': 'rosbag reindex', '.db3': 'ros2 bag reindex',
          '': 'ros2 bag reindex (or mcap recover, for its .mcap)'}
 KNOWN = get_typestore(Stores.ROS2_JAZZY)
 CLOUD_TYPE = 'sensor_msgs/msg/PointCloud2'
 ODOMETRY_TYPE = 'nav_msgs/msg/Odometry'
 BAG_FILES = ('.mcap', '.db3', '.bag')
+
+ZSTD = b'\x28\xb5\x2f\xfd'
+"""How compressed data begins; no message does."""
+LARGEST_MESSAGE = 1 << 30
+"""Bytes, of a compressed message: what claims to be more is cut off, and refused."""
+INSTEAD = {
+    'CustomMsg': 'Livox: start the driver with xfer_format 0, which publishes PointCloud2, or '
+    'convert the bag',
+    'VelodyneScan': 'packets of Velodyne: velodyne_pointcloud makes PointCloud2 of them',
+    'PacketMsg': 'packets of Ouster: ouster_ros makes PointCloud2 of them',
+    'LaserScan': 'of a planar LiDAR, which is too little'}
+"""Types of LiDARs that are no PointCloud2, and what to do about them."""
+
+
+def compressed_or_ros1(path: Path) -> str:
+    """Return what to do about a path that is no bag itself but of bags; empty: nothing."""
+    if path.is_file() and path.name.endswith('.zstd'):
+        return 'a compressed file of a bag: give the folder with its metadata.yaml, or zstd -d it'
+    bags = sorted(file.name for file in path.glob('*.bag')) if path.is_dir() else []
+    return (f'a folder of ROS 1 bags, give one of them: {", ".join(bags[:10])}'
+            + (', ...' if len(bags) > 10 else '')) if bags else ''
 
 
 def is_bag(path: str | Path) -> bool:
@@ -131,9 +159,11 @@ class BagReader:
         if len(topics) > 1:
             topics = [t for t in topics if self._is_labelled(t, label_field)] or topics
         if not topics:
-            others = sorted({c.topic for c in self._reader.connections})
+            types = {c.topic: c.msgtype.rpartition('/')[2] for c in self._reader.connections}
+            told = [f'; {topic} has {kind} ({INSTEAD[kind]})'
+                    for topic, kind in sorted(types.items()) if kind in INSTEAD]
             raise InputError(f'{self.path}: no PointCloud2 in this bag; its topics are '
-                             f'{", ".join(others) or "none at all"}')
+                             f'{", ".join(sorted(types)) or "none at all"}{"".join(told)}')
         if len(topics) > 1:
             raise InputError(f'{self.path}: several topics of clouds, choose one by --topic: '
                              f'{", ".join(topics)}')
@@ -200,6 +230,8 @@ class BagReader:
 
     def _read(self, raw: bytes) -> tuple[int, str, Any]:
         with readable('a message of the bag'):
+            if raw[:4] == ZSTD:    # as the metadata.yaml says, which may not be there
+                raw = zstd.ZstdDecompressor().decompress(raw, LARGEST_MESSAGE)
             message: Any = self._reader.deserialize(raw, CLOUD_TYPE)
             return stamp_ns_of(message.header), message.header.frame_id, message
 

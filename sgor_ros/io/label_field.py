@@ -1,9 +1,9 @@
 """Which field of a cloud holds the class ids, where that is left to us."""
 from typing import Any
 
+from ..core.scan.point_clouds import LABEL_FIELDS
+
 AUTO, NONE = 'auto', 'none'
-# in this order: the usual name, Autoware's, two of other nodes, CARLA's ros-bridge and CARLA's own
-LABEL_FIELDS = ('label', 'class_id', 'semantic_id', 'semantic_label', 'ObjTag', 'object_tag')
 
 
 def field_names(message: Any) -> list[str]:

@@ -18,9 +18,10 @@ from .pointcloud2 import whole_numbers
 
 LABEL_NAMES = ('label', 'labels', 'class')
 
-# float32 a point: without intensity; KITTI; nuScenes, with the ring; with ring and time
-BIN_COLUMNS = (3, 4, 5, 6)
-BIN_ADVICE = 'Name one of 5 columns .pcd.bin, or save points and labels as .npz'
+# float32 a point: without intensity; nuScenes, with the ring; with ring and time; KITTI
+BIN_COLUMNS = {'.xyz.bin': 3, '.pcd.bin': 5, '.xyzirt.bin': 6, '.bin': 4}
+BIN_ADVICE = 'Name it ' + ', '.join(f'{ending} ({columns} columns)' for ending, columns in
+                                     BIN_COLUMNS.items()) + ', or save points and labels as .npz'
 # of 118 real scans, other columns than the right ones are never below 4.7 times as smooth,
 # shuffled ones never below 0.77; wrongly taken for 4, those of 5 and 6 are at 0.21 and less
 SMOOTHER = 0.4
@@ -41,7 +42,8 @@ def read_scan(path: str | Path, labels_path: str | Path | None = None) -> Semant
     Parameters
     ----------
     path : str or Path
-        ``.bin``: float32 x y z intensity, as in KITTI (``.pcd.bin``: and ring, as in nuScenes);
+        ``.bin``: float32 x y z intensity, as in KITTI (``.pcd.bin``: and ring, as in nuScenes;
+        ``.xyz.bin``: x y z alone; ``.xyzirt.bin``: x y z intensity ring time);
         ``.pcd`` (ascii, binary, compressed) or ``.ply``: labels are the field `label`, `labels`
         or `class`, of any type whose values are whole;
         ``.npz``: arrays `points` (N, 3) and, where there are any, `labels` (N,).
@@ -89,10 +91,12 @@ def read_labels(path: str | Path, count: int) -> NDArray[np.int64]:
 
 
 def _read_bin(path: Path) -> Arrays:
-    columns = 5 if path.name.endswith('.pcd.bin') else 4
+    columns = next(count for ending, count in BIN_COLUMNS.items()
+                   if path.name.lower().endswith(ending))
     size = path.stat().st_size
     if size == 0 or size % (4 * columns):
-        others = [str(k) for k in BIN_COLUMNS if k != columns and size and size % (4 * k) == 0]
+        others = [str(k) for k in sorted(BIN_COLUMNS.values())
+                  if k != columns and size and size % (4 * k) == 0]
         raise InputError(f'{path}: {size} bytes are no points of {columns} float32 '
                          f'({4 * columns} bytes each); truncated, or not a scan'
                          + (f', or of {" or ".join(others)} columns: {BIN_ADVICE}'
@@ -116,7 +120,7 @@ def _check_columns(path: Path, values: NDArray[np.float32], columns: int) -> Non
     Sensors write neighbours one after the other. Misread, their columns take turns.
     """
     jump = _jump(values, columns)
-    for other in BIN_COLUMNS:
+    for other in BIN_COLUMNS.values():
         if other != columns and values.size % other == 0:
             least = _jump(values, other)
             if least < SMOOTHER * jump:

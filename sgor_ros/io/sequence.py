@@ -62,6 +62,10 @@ class ScanSequence(Protocol):
     def T_world_sensor(self) -> NDArray[np.float64] | None:
         """True pose of each scan, (N, 4, 4), where they are known."""
 
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What may be wrong with the sequence as a whole, in words."""
+
     def __iter__(self) -> Iterator[StampedScan]: ...
 
 

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from ..core.common.settings import InputError
 from ..core.common.settings import setting
 from ..core.common.settings import Settings
+from ..core.scan.point_clouds import LABEL_FIELDS
 from .frames import parse_transform
 from .label_field import AUTO
-from .label_field import LABEL_FIELDS
 from .time_field import TIME_FIELDS
 
 

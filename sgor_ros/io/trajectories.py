@@ -1,6 +1,7 @@
 """Trajectories in the formats of TUM and KITTI."""
 from collections.abc import Iterable
 from collections.abc import Sequence
+from decimal import Decimal
 import io
 from itertools import pairwise
 from pathlib import Path
@@ -77,6 +78,46 @@ def read_poses(path: str | Path) -> NDArray[np.float64]:
     if missing.size:
         raise InputError(f'{path}: the pose of scan {missing[0]} is not finite')
     return poses
+
+
+def read_timed_poses(path: str | Path) -> tuple[NDArray[np.int64] | None, NDArray[np.float64]]:
+    """Read poses of the format of TUM or of KITTI: by their columns, 8 or 12.
+
+    Returns
+    -------
+    stamps_ns : (N,) int64 or None
+        Nanoseconds, increasing; None in the format of KITTI.
+    poses : (N, 4, 4) float64
+
+    Raises
+    ------
+    InputError
+        As of `read_kitti`; stamps that are none or do not increase; quaternions that are none.
+    """
+    rows = _rows(path)
+    if rows.shape[1] == 12:
+        return None, read_kitti(path)
+    if rows.shape[1] != 8:
+        raise InputError(f'{path}: {rows.shape[1]} numbers a line; expected 8 (TUM: seconds x y z '
+                         'qx qy qz qw) or 12 (KITTI)')
+    seconds, length = rows[:, 0], np.linalg.norm(rows[:, 4:], axis=1)
+    good = ((seconds >= 0) & (seconds < LATEST_S) & (np.abs(length - 1) < ROUNDING)
+            & (np.abs(rows[:, 1:4]).max(axis=1) < FARTHEST_M))
+    good[1:] &= np.diff(seconds) > 0
+    if not good.all():
+        bad = int(np.flatnonzero(~good)[0])
+        raise InputError(f'{path}: line {bad + 1} of numbers is no later time with a pose: '
+                         f'{_short(rows[bad])}')
+    poses = np.tile(np.eye(4), (len(rows), 1, 1))
+    poses[:, :3, :3] = Rotation.from_quat(rows[:, 4:]).as_matrix()
+    poses[:, :3, 3] = rows[:, 1:4]
+    # as text: a double holds the microseconds of a date only
+    return _nanoseconds(path), poses
+
+
+def _nanoseconds(path: str | Path) -> NDArray[np.int64]:
+    first = (line.split('#')[0].split() for line in Path(path).read_text().splitlines())
+    return np.array([int(Decimal(words[0]) * 10**9) for words in first if words], np.int64)
 
 
 def read_times(path: str | Path) -> list[int]:

@@ -20,6 +20,9 @@ UNFINISHED = '.unfinished'
 AT_FDCWD, RENAME_EXCHANGE = -100, 2
 """Of renameat2, which Python has no name for."""
 
+STDOUT = Path('-')
+"""As other commands call it; where that is not meant, no file gets this name."""
+
 
 @contextmanager
 def new_file(path: str | Path) -> Iterator[Path]:
@@ -139,6 +142,8 @@ def free_folder(path: Path) -> Path:
 
 def refuse_existing(path: Path) -> None:
     """Raise InputError where `path` is there: nothing is mixed into it."""
+    if path == STDOUT:
+        raise InputError('-: a folder is written, which standard output cannot take')
     if os.path.lexists(path):
         raise InputError(f'{path}: exists already, and is neither replaced nor added to')
 
@@ -156,6 +161,8 @@ def check_file(path: Path, what: str, endings: tuple[str, ...] = ()) -> None:
     """
     if endings and path.suffix.lower() not in endings:
         raise InputError(f'{what} {path}: expected a name ending in {", ".join(endings)}')
+    if path == STDOUT:
+        raise InputError(f'{what} -: standard output is not possible here')
     if not path.parent.is_dir():
         raise InputError(f'{what} {path}: no folder {path.parent}')
     if path.is_dir():

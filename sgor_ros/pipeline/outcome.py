@@ -47,7 +47,7 @@ class Outcome:
         step = self.tracked.registration
         return Row(self.stamp_ns, self.reason, self.T_odom_child, self.tracked.restarted,
                    math.nan if step is None else step.confidence, self.seconds,
-                   self.tracked.timings)
+                   self.tracked.timings, self.tracked.track_id)
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +67,8 @@ class Row:
     seconds : float
     timings : dict of str to float
         Stage to seconds.
+    track_id : int
+        Poses of one number are in one frame; 0 where the cloud is unusable.
     """
 
     stamp_ns: int
@@ -76,3 +78,4 @@ class Row:
     confidence: float = math.nan
     seconds: float = math.nan
     timings: dict[str, float] = field(default_factory=dict)
+    track_id: int = 0

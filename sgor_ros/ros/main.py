@@ -9,6 +9,7 @@ import sys
 from typing import TYPE_CHECKING
 
 from ..core.execution.cache import choose_cache_folder
+from ..io import standard_streams
 from . import signals
 
 if TYPE_CHECKING:
@@ -26,6 +27,7 @@ examples:
   ros2 run sgor_ros sgor_node --ros-args -r points:=/lidar/labelled
   ros2 run sgor_ros sgor_node --ros-args -p mode:=consecutive -p voxel_size:=0.3
   ros2 param describe /sgor_node voxel_size
+  .venv/bin/sgor_node --ros-args -r points:=/lidar/labelled    (ROS from wheels: no `ros2 run`)
 
 exit codes:
   0    ended by SIGINT or SIGTERM
@@ -36,8 +38,10 @@ exit codes:
 def main(args: list[str] | None = None) -> int:
     """Run the node until a signal comes; return the exit code of the process."""
     signals.end_at_once()
+    standard_streams.fill_gaps()
     if asked := _asked(sys.argv[1:] if args is None else args):
-        print(asked)
+        with standard_streams.not_needed():
+            print(asked)
         return 0
     choose_cache_folder()
     # late: this takes a second, in which signals must do already
@@ -76,7 +80,8 @@ def _run(node: 'SgorNode', flag: signals.SignalFlag) -> int:
             executor.spin_once(PATIENCE_S)
     finally:
         ended = node.stop()
-        print(node.counts(), flush=True)
+        with standard_streams.not_needed():
+            print(node.counts())
         if not ended:
             # it compiles, or its scan takes minutes: threads can't be stopped, processes can
             sys.stderr.flush()
@@ -97,7 +102,8 @@ def _asked(args: list[str]) -> str:
 
 
 def _refuse(error: Exception | str) -> int:
-    print(f'error: {error}', file=sys.stderr)
+    with standard_streams.not_needed():
+        print(f'error: {error}', file=sys.stderr)
     return 2
 
 

@@ -66,17 +66,18 @@ class SgorNode(Node):
         self._log = ThrottledLog(self.get_logger())
         self._diagnostics = DiagnosticsPublisher(self, self._log, self.counts, self._idle)
         self._worker = threading.Thread(target=self._work, name='sgor worker')
-        self._compiled = False
+        self._compiled = self._placed = False
         self._heard_at = self._began_at = 0.0
         self.crash: Exception | None = None
         refuse_unknown_overrides(self, override_names(self))
 
     def _pipeline_of(self, config: NodeConfig) -> Pipeline:
-        sink = TopicSink(self, config.publish_tf, config.loop_closure)
+        self._sink = TopicSink(self, config.publish_tf, config.loop_closure)
         mount = extrinsic.configured(config)
         if mount is None and config.base_frame:
             mount = tf2_extrinsic(self, config.base_frame)
-        return Pipeline(self._tracker(config), config, sink, mount, inverted_tf=config.invert_tf)
+        return Pipeline(self._tracker(config), config, self._sink, mount,
+                        inverted_tf=config.invert_tf)
 
     def _tracker(self, config: NodeConfig) -> Tracker | Mapper:
         if not config.loop_closure:
@@ -167,6 +168,15 @@ class SgorNode(Node):
             outcome = self._pipeline.process(scan)
         if not outcome.frame:
             self._log.warn_once('the clouds have no frame_id: set the parameter sensor_frame')
+        if outcome.T_odom_child is not None and not self._placed:
+            self._placed = True
+            self.get_logger().info(
+                f'first pose, of {self._config.base_frame or outcome.frame} in '
+                f'{self._config.odom_frame}, at {outcome.stamp_ns * 1e-9:.3f} s; from now on the '
+                'log tells of trouble only, /diagnostics of each scan')
+        if self._sink.unacknowledged_edges:
+            self._log.warn_once('a subscriber of the edges does not keep up: it may miss some; '
+                                '/diagnostics counts them (edges unacknowledged)')
         tracked = outcome.tracked
         late = tracked is not None and tracked.state is State.LATE
         done = tracked is not None and tracked.success
@@ -176,6 +186,7 @@ class SgorNode(Node):
         now = time.monotonic()
         self._diagnostics.report(outcome.stamp_ns, outcome.frame, *status.level_of(outcome), {
             **status.details(tracked), **status.map_details(self._pipeline.mapper),
+            'edges unacknowledged': str(self._sink.unacknowledged_edges),
             'seconds': f'{now - self._began_at:.4f}',
             'latency': f'{now - scan.arrived_ns * 1e-9:.4f}'})
 

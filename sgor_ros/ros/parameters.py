@@ -163,7 +163,7 @@ def yaml_files() -> dict[str, str]:
             ('Loops; read when it starts', MapperConfig.shown(), {}),
             ('Node; read when it starts', NodeConfig.shown(), {})),
         'indoor.yaml': _yaml(
-            'Rooms of a few metres: what differs from the defaults.',
+            'Deprecated: the defaults find the scale of a room, and register more scans of it.',
             ('SgorConfig.indoor()', _named(SgorConfig, indoor), indoor)),
         'consecutive.yaml': _yaml(
             'Register each scan to the one before: what differs from the defaults.',

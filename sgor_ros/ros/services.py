@@ -6,15 +6,20 @@ from geometry_msgs.msg import PoseWithCovarianceStamped
 import numpy as np
 from numpy.typing import NDArray
 from rclpy.node import Node
+from scipy.spatial.transform import Rotation
 from std_srvs.srv import Trigger
 
+from ..core.common import se3
 from ..core.common.settings import InputError
 from ..io.frames import frame_id
-from ..io.messages import matrix_of
 
 Array = NDArray[np.float64]
 # a quaternion of this length or more is taken for a rotation
 SHORTEST_QUATERNION = 0.5
+# float32 of other programs is as exact as that
+ROUNDING = 1e-5
+# around the earth and beyond
+FARTHEST_M = 1e9
 
 
 class Services:
@@ -77,21 +82,44 @@ class Services:
     def _on_set_pose(self, message: PoseWithCovarianceStamped) -> None:
         """Begin a new track there with the next scan."""
         frame = frame_id(message.header.frame_id)
-        q = message.pose.pose.orientation
-        x = message.pose.pose.position
-        numbers = np.array([x.x, x.y, x.z, q.x, q.y, q.z, q.w])
-        covariance = np.array(message.pose.covariance).reshape(6, 6)
+        start = start_of(message)
         if frame not in ('', self._odom_frame):
-            self._log.warning(f'set_pose: in the frame {frame}, not in {self._odom_frame}: '
-                              'ignored')
-        elif (not np.isfinite(numbers).all() or not np.isfinite(covariance).all()
-              or np.linalg.norm(numbers[3:]) < SHORTEST_QUATERNION):
-            self._log.warning('set_pose: not a finite pose with a rotation: ignored')
-        else:
-            with self._lock:
-                self._reset = True
-                self._start = matrix_of(message.pose.pose), covariance
-            self._log.info('set_pose: the next scan starts a new track there')
+            start = f'in the frame {frame}, not in {self._odom_frame}'
+        if isinstance(start, str):
+            self._log.warning(f'set_pose: {start}: ignored')
+            return
+        with self._lock:
+            self._reset = True
+            self._start = start
+        self._log.info('set_pose: the next scan starts a new track there')
+
+
+def start_of(message: PoseWithCovarianceStamped) -> tuple[Array, Array] | str:
+    """Return the (4, 4) pose and (6, 6) covariance of a message, or what is wrong with it."""
+    x, q = message.pose.pose.position, message.pose.pose.orientation
+    position, quaternion = np.array([x.x, x.y, x.z]), np.array([q.x, q.y, q.z, q.w])
+    covariance = np.array(message.pose.covariance, np.float64).reshape(6, 6)
+    for name, values in (('position', position), ('orientation', quaternion),
+                         ('covariance', covariance)):
+        if not np.isfinite(values).all():
+            return f'its {name} is not finite'
+    if np.abs(position).max() > FARTHEST_M:
+        return f'its position is {np.abs(position).max():.3g} m away'
+    largest = np.abs(quaternion).max()
+    if (largest < SHORTEST_QUATERNION / 2
+            or np.linalg.norm(quaternion / largest) < SHORTEST_QUATERNION / largest):
+        return 'its orientation is no rotation, but a quaternion near zero'
+    scale = np.abs(covariance).max()
+    if scale > FARTHEST_M**2:
+        return f'its covariance has an entry of {scale:.3g}'
+    if np.abs(covariance - covariance.T).max() > ROUNDING * scale:
+        return 'its covariance is not symmetric'
+    covariance = (covariance + covariance.T) / 2
+    lowest = float(np.linalg.eigvalsh(covariance)[0])
+    if lowest < -ROUNDING * scale:
+        return f'its covariance is not positive semidefinite: its least eigenvalue is {lowest:.3g}'
+    R = Rotation.from_quat(quaternion / largest).as_matrix()
+    return se3.compose(R, position), covariance
 
 
 def _done(response: Trigger.Response, message: str) -> Trigger.Response:

@@ -19,7 +19,8 @@ from sgor_ros.commands.command_line import run
 MODULES = {'sgor_register': 'commands.register', 'sgor_replay': 'commands.replay',
            'sgor_kitti_to_bag': 'commands.kitti_to_bag', 'sgor_benchmark': 'commands.benchmark',
            'sgor_map': 'commands.map', 'sgor_demo': 'commands.demo',
-           'sgor_tables': 'commands.tables', 'sgor_node': 'ros.main'}
+           'sgor_tables': 'commands.tables', 'sgor_warm_up': 'commands.warm_up',
+           'sgor_node': 'ros.main'}
 COMMANDS = [(name,) for name in MODULES if name != 'sgor_node'] + [
     ('sgor_benchmark', kind) for kind in ('pairs', 'wrong', 'ablation', 'sequence', 'solver')] + [
     ('sgor_map', kind) for kind in ('build', 'locate', 'merge', 'export', 'show')]
@@ -94,20 +95,43 @@ def test_without_ros(module):
     assert len(said.stderr.splitlines()) == 1
 
 
-def test_a_reader_that_has_had_enough(pair):
-    with subprocess.Popen(line('sgor_register', *pair), stdout=subprocess.PIPE,
-                          stderr=subprocess.PIPE) as process:
+@pytest.mark.parametrize('name', ['sgor_register', 'sgor_warm_up'])
+def test_a_reader_that_has_had_enough(name, pair):
+    with subprocess.Popen(line(name, *(pair if name == 'sgor_register' else ())),
+                          stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
         process.stdout.close()
         assert process.wait(400) == 141
         assert process.stderr.read() == b''
 
 
-def test_a_screen_that_cannot_be_written(pair):
+@pytest.mark.parametrize('name', ['sgor_register', 'sgor_warm_up'])
+def test_a_screen_that_cannot_be_written(name, pair):
     with open('/dev/full', 'w') as full:
-        said = subprocess.run(line('sgor_register', *pair), stdout=full, stderr=subprocess.PIPE,
-                              text=True, check=False)
+        said = subprocess.run(line(name, *(pair if name == 'sgor_register' else ())), stdout=full,
+                              stderr=subprocess.PIPE, text=True, check=False)
     assert said.returncode == 3
     assert said.stderr == 'error: [Errno 28] No space left on device\n'
+
+
+@pytest.mark.parametrize('name', ['sgor_replay', 'sgor_warm_up', 'sgor_node'])
+@pytest.mark.parametrize('option', ['--help', '--version'])
+@pytest.mark.parametrize('stdout', ['>/dev/full', '>&-', '| true'])
+def test_help_that_nobody_can_read_is_no_error(name, option, stdout):
+    said = ran('bash', '-c', f'set -o pipefail; "$0" "$@" {stdout}', *line(name, option))
+    assert (said.returncode, said.stderr) == (0, '')
+
+
+def test_streams_that_are_closed_or_full(pair, tmp_path):
+    """As a service manager or a careless script starts a command."""
+    shell = ['bash', '-c', '"$0" "${@:2}" --json "$1/$RANDOM.json"']
+    for gone in ('>&-', '2>&-', '>&- 2>&-'):
+        said = ran(*shell[:2], f'{shell[2]} {gone}', line('sgor_register')[0], tmp_path,
+                   *line('sgor_register')[1:], *pair)
+        assert said.returncode == 0, said.stderr
+        assert 'Traceback' not in said.stderr
+    assert len(list(tmp_path.glob('*.json'))) == 3
+    said = ran('bash', '-c', '"$0" "$@" 2>/dev/full', *line('sgor_register', '/nope', pair[0]))
+    assert said.returncode == 2
 
 
 def test_a_fault_of_the_program_is_no_result(pair):

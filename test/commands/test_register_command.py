@@ -40,6 +40,16 @@ def test_result_on_screen_in_json_and_as_picture(pair, tmp_path, capsys):
     assert (tmp_path / 'r.png').read_bytes().startswith(b'\x89PNG')
 
 
+def test_json_to_standard_output_is_nothing_but_json(pair, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main([*pair[:2], '--json', '-']) == 0
+    said = capsys.readouterr()
+    assert json.loads(said.out)['success']
+    assert 'T_target_source' in said.err
+    assert list(tmp_path.iterdir()) == [], 'no file of the name -'
+    assert main([*pair[:2], '--plot', '-']) == 2
+
+
 def test_the_time_is_that_of_the_whole_work(pair, tmp_path, capsys):
     begin = time.perf_counter()
     assert main([*pair[:2], '--json', str(tmp_path / 'r.json')]) == 0
@@ -186,17 +196,20 @@ def test_real_pair_with_two_label_conventions(data_folder, tmp_path):
     assert degrees < 0.5
 
 
-def test_real_indoor_pair(data_folder, tmp_path):
+@pytest.mark.parametrize('preset', [[], ['--preset', 'indoor']])
+def test_real_indoor_pair(data_folder, tmp_path, capsys, preset):
+    """As any space; the preset that was for it is deprecated, and works."""
     lines = (data_folder / 'indoor/7-scenes-redkitchen_gt.log').read_text().splitlines()
     start = next(i for i, line in enumerate(lines) if line.split()[:2] == ['0', '4'])
     truth = np.array([line.split() for line in lines[start + 1:start + 5]], float)
     assert main([str(data_folder / 'indoor/cloud_bin_4.ply'),
-                 str(data_folder / 'indoor/cloud_bin_0.ply'), '--preset', 'indoor',
+                 str(data_folder / 'indoor/cloud_bin_0.ply'), *preset,
                  '--json', str(tmp_path / 'r.json')]) == 0
     result = json.loads((tmp_path / 'r.json').read_text())
     metres, degrees = errors(np.array(result['T_target_source']), truth)
     assert metres < 0.1
     assert degrees < 3.0
+    assert ('--preset indoor is deprecated' in capsys.readouterr().err) == bool(preset)
 
 
 def test_a_number_is_no_name_of_a_setting(pair, tmp_path, capsys):

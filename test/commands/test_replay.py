@@ -22,8 +22,11 @@ from sgor_ros import SgorConfig
 from sgor_ros import Tracker
 from sgor_ros.commands.kitti_to_bag import main as kitti_to_bag
 from sgor_ros.commands.replay import main
+from sgor_ros.evaluation.report.track_plots import COLOURS
+from sgor_ros.evaluation.report.track_plots import plot_track
 from sgor_ros.io.bags import BagReader
 from sgor_ros.io.bags import BagWriter
+from sgor_ros.io.colours import LOST
 from sgor_ros.io.frames import parse_transform
 from sgor_ros.io.header_stamp import stamp_ns_of
 from sgor_ros.io.messages import header
@@ -195,8 +198,34 @@ def test_time_that_runs_backwards_starts_anew(street, tmp_path, capsys):
     assert main([str(again), '--output', str(tmp_path / 'out')]) == 0
     # the first that falls back may be late, the second confirms the jump
     assert summary(tmp_path / 'out')['restarts'] == [0, 4]
-    assert 'time ran backwards' in capsys.readouterr().err
-    np.testing.assert_array_equal(read_kitti(tmp_path / 'out/trajectory_kitti.txt')[4], np.eye(4))
+    said = capsys.readouterr()
+    assert 'time ran backwards' in said.err
+    assert '2 tracks, each in a frame of its own: trajectory.tum is the first, ' \
+        'trajectory_2.tum the second\n' in said.out
+    first, second = (read_kitti(tmp_path / f'out/trajectory_kitti{number}.txt')
+                     for number in ('', '_2'))
+    known = [np.flatnonzero(~np.isnan(poses[:, 0, 0])).tolist() for poses in (first, second)]
+    assert known == [[0, 1, 2], [4, 5]], 'scan 3 came late'
+    np.testing.assert_array_equal(second[4], np.eye(4))
+    for number, count in (('', 3), ('_2', 2)):
+        rows = np.loadtxt(tmp_path / f'out/trajectory{number}.tum', ndmin=2)
+        assert len(rows) == count
+        assert np.linalg.norm(np.diff(rows[:, 1:4], axis=0), axis=1).max() < 2.0, 'no jump'
+    assert [(track['scans']) for track in summary(tmp_path / 'out')['tracks']] == [3, 2]
+
+
+def test_a_picture_draws_no_line_from_track_to_track(tmp_path):
+    poses = [np.eye(4) for _ in range(7)]
+    for pose, x in zip(poses, (0, 1, 2, 0, 1, 2, 3), strict=True):
+        pose[0, 3] = x
+    poses[5] = None
+    plot_track(tmp_path / 'a.svg', 'two', np.arange(7) / 10, poses, [0.1] * 7, [0.9] * 7,
+               [1, 1, 1, 2, 2, 2, 2], {})
+    drawn = (tmp_path / 'a.svg').read_text()
+    lines = [len(re.findall('[ML] ', path)) for colour in (*COLOURS[:2], LOST) for path in
+             re.findall(rf'<path d="([^"]*)"[^>]*stroke: {colour}; stroke-width: 2', drawn)]
+    # three poses each, and three dots each in the legend; the gap of the second
+    assert sorted(lines) == [2, 3, 3, 3, 3]
 
 
 def test_missing_label_field_tells_the_fields(street, tmp_path, capsys):

@@ -1,4 +1,6 @@
 """Two scans in, transformation out: the street, whose truth is known."""
+import json
+
 from conftest import errors
 from conftest import relative
 import numpy as np
@@ -163,12 +165,18 @@ def test_half_of_all_labels_wrong(scans, street, source, target):
 
 
 def test_no_labels_at_all(scans, street):
-    """It registers, and both warnings say how the ground was found."""
+    """It registers, both planes say how they were found, and nothing is warned of."""
     result = register(SemanticScan(scans[3].points), SemanticScan(scans[0].points))
     assert_right(result, truth_of(street, 3, 0))
     assert result.source_ground.source == result.target_ground.source == 'geometry'
-    for side in ('source', 'target'):
-        assert f'{side}: no ground labels: ground plane found by geometry' in result.warnings
+    assert result.warnings == ()
+
+
+def test_labels_without_a_ground_among_them_are_told(scans):
+    points, labels = scans[0].points, scans[0].labels
+    walls = np.where(np.isin(labels, (40, 44, 48, 49, 72)), 0, labels)
+    assert 'no ground labels: ground plane found by geometry' in preprocess(
+        SemanticScan(points, walls)).warnings
 
 
 @pytest.mark.parametrize('labelled', ['source', 'target'])
@@ -300,7 +308,8 @@ def test_confidence_decides(prepared):
     # several matches on one point count once
     count = int(result.reason.split()[1])
     assert 100 < count <= result.inliers.sum()
-    assert result.reason == f'only {count} inliers, min_inliers is 10000'
+    shared = f': {result.solution.inliers.sum()} matches agree, at {count} points'
+    assert result.reason.removesuffix(shared) == f'only {count} inliers, min_inliers is 10000'
 
 
 @pytest.mark.parametrize('labels', [True, False])
@@ -372,3 +381,24 @@ def test_prepared_scans_bring_their_configuration(scans):
         assert found.status is Status.REFUSED
         assert 'min_confidence 1.00' in found.reason
     assert register(source, target, config.replace(min_confidence=0.85)).success
+
+
+def test_a_result_as_json_and_what_it_does_to_points(scans, street):
+    result = register(scans[3], scans[0])
+    told = json.loads(json.dumps(result.to_dict()))
+    assert told['success']
+    np.testing.assert_array_equal(told['T_target_source'], result.T_target_source)
+    assert told['inliers'] == result.inliers.sum()
+    moved = result.transform(street[3][0])
+    world = [points @ T[:3, :3].T + T[:3, 3] for points, T in (
+        (moved, street[0][2]), (street[3][0], street[3][2]))]
+    assert np.abs(world[0] - world[1]).max() < 0.5
+    np.testing.assert_allclose(result.transform([0.0, 0.0, 0.0]), result.T_target_source[:3, 3])
+    with pytest.raises(InputError, match=r'expected an \(N, 3\) array, got shape \(3, 2\)'):
+        result.transform(np.zeros((3, 2)))
+    rng = np.random.default_rng(0)
+    refused = register(*(rng.uniform(-30, 30, (5000, 3)) for _ in range(2)))
+    told = json.loads(json.dumps(refused.to_dict()))
+    assert (told['success'], told['T_target_source']) == (False, None)
+    with pytest.raises(InputError, match='transform: not registered: '):
+        refused.transform(np.zeros((1, 3)))

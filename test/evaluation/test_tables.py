@@ -184,7 +184,7 @@ def test_processes_and_dask_give_the_same_table(tmp_path, drive):
 
 def test_another_protocol_does_not_go_into_the_same_folder(tmp_path, drive):
     run(strided([drive], [1]), [Method('m', on_matches=centroid)], tmp_path)
-    with pytest.raises(InputError, match='holds a run with other settings'):
+    with pytest.raises(InputError, match='holds a run with another protocol'):
         run(posed([drive], 5.0), [Method('m', on_matches=centroid)], tmp_path)
 
 
@@ -355,7 +355,21 @@ def test_the_command_with_a_method_of_ones_own(tmp_path):
         assert f'| {name} | 4 |' in done.stdout
     for name in ('results.md', 'table.tex', 'errors.png', 'matches.png', 'setup.json'):
         assert (tmp_path / 'out' / name).stat().st_size > 100
-    assert 'With 4 pairs' in (tmp_path / 'out/results.md').read_text()
+    page = (tmp_path / 'out/results.md').read_text()
+    assert 'With 4 pairs' in page
+    other_world = subprocess.run([*command, '--seed', '1'], cwd=tmp_path, capture_output=True,
+                                 text=True, timeout=300)
+    assert other_world.returncode == 2
+    assert 'out: holds a run with another data' in other_world.stderr
+    # a smaller table does not replace the one that took longer
+    command[command.index('--limit') + 1] = '2'
+    smaller = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=300)
+    assert smaller.returncode == 0, smaller.stderr
+    assert 'out: the table there was of 4 pairs, 3 methods, 1 variants, this one is of 2 pairs, ' \
+        '3 methods, 1 variants: that one is in out/earlier now' in smaller.stderr
+    assert (tmp_path / 'out/earlier/results.md').read_text() == page
+    assert (tmp_path / 'out/earlier/errors.png').is_file()
+    assert 'With 2 pairs' in (tmp_path / 'out/results.md').read_text()
 
 
 @pytest.mark.parametrize(('arguments', 'says'), [

@@ -187,6 +187,45 @@ def test_stamps_are_exact_to_the_nanosecond(street, tmp_path):
     assert drive.stamps_ns.tolist() == [s + 1 for s in STAMPS]
 
 
+@pytest.mark.parametrize(('names', 'stamps'), [
+    (['0.05', '0.1', '0.4', '10.25'], [50_000_000, 100_000_000, 400_000_000, 10_250_000_000]),
+    (['0', '0.1', '0.15', '1e1'], [0, 100_000_000, 150_000_000, 10_000_000_000]),
+    (['1691936557.946849179', '1691936558.0', '1691936558.05', '1691936558.1'],
+     [1691936557946849179, 1691936558000000000, 1691936558050000000, 1691936558100000000]),
+    (['1691936557_50000000', '1691936557_100000000', '1691936558_0', '1691936558_7'],
+     [1691936557050000000, 1691936557100000000, 1691936558000000000, 1691936558000000007]),
+    (['7-050000000', '7-100000000', '8-000000000', '11-000000000'],
+     [7_050_000_000, 7_100_000_000, 8_000_000_000, 11_000_000_000]),
+    (['1691936557000000', '1691936557050000', '1691936557100000', '1691936557150000'],
+     [1691936557000000000 + i * 50_000_000 for i in range(4)]),
+    (['1691936557000', '1691936557050', '1691936557100', '1691936557150'],
+     [1691936557000000000 + i * 50_000_000 for i in range(4)]),
+    (['0000000000000001', '0000000000000002', '0000000000000003', '0000000000000004'], None),
+    (['scan2', 'scan10', 'scan11', 'scan100'], None), (['a_1', 'a_2', 'a_3', 'a_10'], None),
+    (['1_1', '1_2', '1_10', '2_1'], None), (['v0.5', 'v0.25', 'v1.5', 'v10.5'], None)])
+def test_scans_are_in_the_order_of_their_names_which_may_be_times(tmp_path, names, stamps):
+    for i, name in enumerate(names):
+        write_bin(tmp_path / f'{name}.bin', np.full((5, 3), 1.0 + i))
+    drive = open_drive(tmp_path)
+    if names[0] == 'v0.5':
+        names = ['v0.25', 'v0.5', 'v1.5', 'v10.5']
+    assert [scan.name.partition('/')[2] for scan in drive.scans] == names
+    assert (None if drive.stamps_ns is None else drive.stamps_ns.tolist()) == stamps
+
+
+def test_numbers_of_files_that_jump_are_a_warning(street, tmp_path, capsys):
+    for number, (points, *_) in zip((126, 127, 530, 531), street, strict=True):
+        write_bin(tmp_path / f'drive/{number:06d}.bin', points)
+    drive = open_drive(tmp_path / 'drive')
+    text, = drive.warnings
+    assert 'jump from drive/000127 to drive/000530: some are missing' in text
+    assert replay([str(tmp_path / 'drive'), '--output', str(tmp_path / 'out')]) == 0
+    assert f'warning: {text}' in capsys.readouterr().err
+    assert json.loads((tmp_path / 'out/summary.json').read_text())['warnings'][0] == text
+    (tmp_path / 'drive/times.txt').write_text('0\n0.1\n0.2\n0.3\n')
+    assert open_drive(tmp_path / 'drive').warnings == (), 'times tell'
+
+
 def test_a_bag_and_what_it_was_made_of(street, tmp_path):
     folder = write_semantickitti(tmp_path / '08', street)
     T = np.eye(4)[:3].ravel()

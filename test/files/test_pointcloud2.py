@@ -12,6 +12,7 @@ from sgor_ros import Registration
 from sgor_ros import Status
 from sgor_ros import TrackedScan
 from sgor_ros.io import messages
+from sgor_ros.io.header_stamp import stamp_ns_of
 from sgor_ros.io.label_field import choice_in_words
 from sgor_ros.io.label_field import label_field_of
 from sgor_ros.io.pointcloud2 import decode
@@ -201,7 +202,7 @@ def pose(yaw, xyz):
 def test_odometry_has_pose_covariance_and_twist_where_ros_has_them():
     message = messages.odometry(bag_type, tracked(), 'odom', 'lidar')
     assert (message.header.frame_id, message.child_frame_id) == ('odom', 'lidar')
-    assert messages.stamp_ns_of(message.header) == 1_700_000_000_123_456_789
+    assert stamp_ns_of(message.header) == 1_700_000_000_123_456_789
     position, turn = message.pose.pose.position, message.pose.pose.orientation
     assert (position.x, position.y, position.z) == pytest.approx((4.0, -2.0, 1.0))
     assert (turn.x, turn.y, turn.z, turn.w) == pytest.approx((0, 0, np.sin(0.15), np.cos(0.15)))
@@ -213,7 +214,7 @@ def test_odometry_has_pose_covariance_and_twist_where_ros_has_them():
 
 def test_a_relative_pose_names_both_scans():
     message = messages.relative_pose(bag_type, tracked(), 'lidar')
-    assert messages.stamp_ns_of(message.header) == 1_700_000_000_123_456_789
+    assert stamp_ns_of(message.header) == 1_700_000_000_123_456_789
     assert message.header.frame_id == 'lidar@5'
     assert message.child_frame_id == 'lidar@1700000000123456789'
     np.testing.assert_allclose(messages.matrix_of(message.pose.pose),

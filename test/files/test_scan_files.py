@@ -59,12 +59,18 @@ def test_nuscenes_has_five_columns(tmp_path, scan):
 
 
 @pytest.mark.parametrize(('name', 'columns'), [
+    ('a.xyz.bin', 3), ('a.XYZ.bin', 3), ('a.xyzirt.bin', 6), ('a.bin', 4)])
+def test_other_columns_can_be_named(tmp_path, scan, name, columns):
+    check(read_scan(write_bin(tmp_path / name, scan[0], columns)), scan[0], None)
+
+
+@pytest.mark.parametrize(('name', 'columns'), [
     ('a.bin', 3), ('a.bin', 5), ('a.bin', 6), ('a.pcd.bin', 4)])
 def test_another_number_of_columns_is_noticed(tmp_path, street, name, columns):
     """Also where the size fits; and the same points shuffled say nothing, so they are read."""
     points = street[0][0][:12000].astype(np.float32)
     path = write_bin(tmp_path / name, points, columns)
-    with pytest.raises(InputError, match=f'it has {columns} columns. Name one of 5 columns'):
+    with pytest.raises(InputError, match=f'it has {columns} columns. Name it .xyz.bin'):
         read_scan(path)
     right = 5 if name == 'a.pcd.bin' else 4
     check(read_scan(write_bin(tmp_path / name, points, right)), points, None)
@@ -73,7 +79,7 @@ def test_another_number_of_columns_is_noticed(tmp_path, street, name, columns):
 
 
 def test_a_size_of_five_columns_is_told(tmp_path, scan):
-    with pytest.raises(InputError, match=r'or of 5 columns: Name one of 5 columns \.pcd\.bin'):
+    with pytest.raises(InputError, match=r'or of 5 columns: Name it .*, \.pcd\.bin \(5 columns\)'):
         read_scan(write_bin(tmp_path / 'a.bin', scan[0][:7], 5))
 
 

@@ -137,6 +137,8 @@ def test_set_pose_begins_a_track_there(pair, scans):
     partner.spin_until(lambda: publisher.get_subscription_count() > 0)
     publisher.publish(given_pose(np.eye(4), doubt, 'map'))
     partner.spin_until(lambda: 'set_pose: in the frame map' in node.log.read_text())
+    publisher.publish(given_pose(start, -doubt))
+    partner.spin_until(lambda: 'set_pose: its covariance is not pos' in node.log.read_text())
     publisher.publish(given_pose(start, doubt))
     partner.spin_until(lambda: 'starts a new track there' in node.log.read_text())
     for scan in scans[1:]:
@@ -165,6 +167,7 @@ def test_a_frame_that_changes_is_told_and_has_no_slash(pair, scans):
         'front', 'front', 'rear', 'rear']
     assert partner.odometry[2].twist.covariance[0] > 1e5    # not the motion of one sensor
     partner.spin_until(lambda: len(edges) == 3)
+    assert node.log.read_text().count('first pose, of front in odom, at 100.000 s') == 1
     assert edges[1].header.frame_id.startswith('front@')
     assert edges[1].child_frame_id.startswith('rear@')
     assert 'changed from front to rear' in node.log.read_text()

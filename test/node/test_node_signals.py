@@ -2,6 +2,8 @@
 import os
 import re
 import signal
+import subprocess
+import sys
 import time
 
 import numpy as np
@@ -105,3 +107,21 @@ def test_at_work(domain, clouds, tmp_path):
             partner.spin_for(0.2 * share)
             assert_clean(node, end(node, signals), f'at work, {0.2 * share:.2f} s')
         assert re.fullmatch(COUNTS, node.log.read_text().splitlines()[-1])
+
+
+@pytest.mark.parametrize('stream', ['stdout', 'stderr', 'both'])
+def test_with_nowhere_to_print(domain, stream):
+    """A disk that is full, as of a log: it works, and ends as it should."""
+    with open('/dev/full', 'w') as full:
+        streams = {name: full if stream in (name, 'both') else subprocess.DEVNULL
+                   for name in ('stdout', 'stderr')}
+        process = subprocess.Popen([sys.executable, '-m', 'sgor_ros.ros.main'],
+                                   env=domain.environment(), **streams)
+    partner = ros.Partner(domain)
+    try:
+        partner.wait_for_node(lambda: process.poll() is None)
+        process.send_signal(signal.SIGINT)
+        assert process.wait(TIMEOUT_S) == 0
+    finally:
+        process.kill()
+        partner.close()

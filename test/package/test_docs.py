@@ -18,6 +18,7 @@ from sgor_ros import register
 from sgor_ros import SemanticScan
 from sgor_ros import SgorConfig
 from sgor_ros import TrackerConfig
+from sgor_ros.core.execution.compiling import TAKES
 from sgor_ros.ros.parameters import NodeConfig
 from sgor_ros.world import Lidar
 from sgor_ros.world import scenes
@@ -184,3 +185,12 @@ def test_what_is_refused_is_no_edge(street):
     exec(code_of('docs/trust.md'), scope)
     noise = np.random.default_rng(0).uniform(-30, 30, (20000, 3))
     assert scope['edges'](register(SemanticScan(noise), SemanticScan(street[0][0]))) == []
+
+
+def test_compiling_takes_the_same_on_every_page():
+    """Whoever waits for it has read one of them."""
+    pages = {path.name: path.read_text() for path in PAGES}
+    for name in ('README.md', 'start.md', 'api.md'):
+        assert TAKES in pages[name]
+    for name, text in pages.items():
+        assert not re.search(r'compil\w+[^.|]{0,60}\b\d+ (seconds|minutes|min|s)\b', text), name

@@ -47,3 +47,13 @@ def test_names_are_seen_before_they_are_loaded():
     done = run('help("sgor_ros")', cwd=ROOT)
     assert 'register(source: ' in done.stdout
     assert 'class SgorConfig(' in done.stdout
+
+
+def test_help_and_completion_show_the_interface():
+    """And nothing else that begins with a letter but rooms that are loaded."""
+    done = run('import sgor_ros; print(*dir(sgor_ros)); print(sgor_ros.__doc__)')
+    names, text = done.stdout.split('\n', 1)
+    assert set(sgor_ros.__all__) <= set(names.split())
+    assert not {'Any', 'TYPE_CHECKING', 'DATASETS', 'ModuleType'} & set(names.split())
+    for call in ('preprocess(', 'register(', 'Tracker().track(', 'open_drive(', '.transform('):
+        assert call in text

@@ -3,10 +3,12 @@ from importlib.metadata import entry_points
 from importlib.metadata import version
 import os
 from pathlib import Path
+import re
 import shutil
 import signal
 import subprocess
 import sys
+import sysconfig
 
 from catkin_pkg.package import parse_package
 import numpy as np
@@ -177,3 +179,30 @@ def test_node_out_of_install_tracks_and_ends_on_interrupt(by_colcon, tmp_path):
         node.kill()
         partner.close()
         domain.close()
+
+
+def test_an_editable_install_is_a_path_that_type_checkers_find(source, tmp_path):
+    """With the options of scripts/setup.sh, by both that may install there."""
+    setup = (ROOT / 'scripts/setup.sh').read_text()
+    options = re.search(r'^editable=\((.*)\)$', setup, re.MULTILINE)[1].split()
+    (tmp_path / 'use.py').write_text('from sgor_ros import SgorConfig\nSgorConfig(3)\n')
+    venvs = {name: tmp_path / name for name in ('pip', 'uv')}
+    installers = {'pip': [sys.executable, '-m', 'pip', '--python', venvs['pip'] / 'bin/python',
+                          'install'],
+                  'uv': [Path(sys.executable).with_name('uv'), 'pip', 'install', '--python',
+                         venvs['uv'] / 'bin/python']}
+    if not installers['uv'][0].is_file():
+        del installers['uv']
+    for name, installer in installers.items():
+        python = venvs[name] / 'bin/python'
+        run(sys.executable, '-m', 'venv', '--without-pip', venvs[name])
+        site, = venvs[name].glob('lib/python3.*/site-packages')
+        (site / 'lent.pth').write_text(sysconfig.get_path('purelib') + '\n')
+        run(*installer, '--quiet', '--no-deps', '--no-build-isolation', *options, source)
+        done = subprocess.run(
+            [sys.executable, '-m', 'mypy', '--strict', '--ignore-missing-imports', '--cache-dir',
+             str(tmp_path / 'cache'), '--python-executable', str(python), 'use.py'], cwd=tmp_path,
+            capture_output=True, text=True, check=False, env={
+                name: value for name, value in os.environ.items()
+                if name not in ('PYTHONPATH', 'MYPYPATH')})
+        assert 'has incompatible type "int"' in done.stdout or 'Too many positional' in done.stdout

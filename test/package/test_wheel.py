@@ -178,6 +178,15 @@ def test_types_reach_those_who_use_the_package(bare, tmp_path):
     examples = shutil.copytree(EXAMPLES, tmp_path / 'examples')
     done = strictly(bare, tmp_path, *sorted(examples.glob('*.py')))
     assert done.returncode == 0, done.stdout + done.stderr
+    right = tmp_path / 'right.py'
+    right.write_text('import numpy as np\nfrom sgor_ros import register, Registration\n'
+                     'result = register(np.zeros((9, 3)), np.zeros((9, 4)))\n'
+                     'kept: Registration = result\n'
+                     'if result.success:\n    print(result.T_target_source[0, 3])\n')
+    done = strictly(bare, tmp_path, right)
+    assert done.returncode == 0, done.stdout
+    right.write_text(right.read_text().replace('if result.success', 'if result.reason'))
+    assert 'not indexable' in strictly(bare, tmp_path, right).stdout
     wrong = tmp_path / 'wrong.py'
     wrong.write_text('from sgor_ros import SemanticScan, register\n'
                      'scan = SemanticScan([[0, 0, 0]])\nregister(scan, scan, 3)\n')

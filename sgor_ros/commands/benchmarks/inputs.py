@@ -93,4 +93,5 @@ def finish(arguments: Namespace, folder: Path, text: str, records: list[dict[str
 
 def say(text: str) -> None:
     """Tell how far it is, beside the table."""
-    print(text, file=sys.stderr)
+    if text:
+        print(text, file=sys.stderr)

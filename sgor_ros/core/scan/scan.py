@@ -2,6 +2,7 @@
 from copy import copy
 from dataclasses import dataclass
 from typing import Any
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -9,9 +10,9 @@ from numpy.typing import NDArray
 
 from ..common.checks import as_labels
 from ..common.checks import as_numbers
-from ..common.checks import as_points
 from ..common.checks import finite_rows
 from ..common.settings import InputError
+from .point_clouds import points_and_labels
 
 ORIGIN = np.zeros(3)
 """Where the sensor is, as a rule."""
@@ -19,6 +20,14 @@ LONGEST_SWEEP = 10.0
 """Seconds: no sensor takes longer, and stamps of another clock are no times of points."""
 ROUNDED = 1e-3
 """Metres: what is told of rounding to float32, which begins some 10 km from the origin."""
+
+
+class PointCloud(Protocol):
+    """What has points, as a cloud of Open3D."""
+
+    @property
+    def points(self) -> Any:
+        """Return the points, (N, 3)."""
 
 
 @dataclass(frozen=True, eq=False, init=False, repr=False)
@@ -29,10 +38,12 @@ class SemanticScan:
 
     Parameters
     ----------
-    points : (N, 3) array of numbers
-        Metres, in the sensor frame. Rows that are not finite are dropped, with their labels.
+    points : (N, 3) or (N, 4) array of numbers, structured array, tensor, or Open3D cloud
+        Metres, in the sensor frame. Rows that are not finite are dropped, with their labels. A
+        fourth column, intensity, is left out. A structured array has the fields x, y and z.
     labels : (N,) array of integers, optional
-        Ids of the configured label convention.
+        Ids of the configured label convention. Default: a field `label`, `class_id` or the like
+        of a structured array; else there are none.
     origin : (3,) array, optional
         Where the sensor is in the frame of the points, metres: for clouds in the frame of the
         vehicle, or of a map. Default: at the origin.
@@ -59,10 +70,11 @@ class SemanticScan:
     rounding: float
     """How far off half of the points are at least for being kept as float32, metres; 0: little."""
 
-    def __init__(self, points: ArrayLike, labels: ArrayLike | None = None, *,
+    def __init__(self, points: ArrayLike | PointCloud, labels: ArrayLike | None = None, *,
                  origin: ArrayLike | None = None, up: ArrayLike | None = None,
                  times: ArrayLike | None = None) -> None:
-        exact = as_points(points, 'points', None)
+        exact, found = points_and_labels(points)
+        labels = found if labels is None else labels
         with np.errstate(over='ignore'):
             clean = exact.astype(np.float32, order='C')
         ids = None if labels is None else as_labels(labels, len(clean), 'labels').copy()

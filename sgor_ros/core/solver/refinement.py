@@ -44,7 +44,8 @@ def unobservable(source: NDArray[np.float64], target: NDArray[np.float64],
     # several matches may end at the same point
     distinct = min(len(np.unique(points, axis=0)) for points in (source, target))
     if distinct < config.min_inliers:
-        return f'only {distinct} inliers, min_inliers is {config.min_inliers}'
+        shared = f': {len(source)} matches agree, at {distinct} points' * (len(source) > distinct)
+        return f'only {distinct} inliers, min_inliers is {config.min_inliers}{shared}'
     for points in (source, target):
         across = np.sqrt(np.linalg.eigvalsh(np.cov(points.T))[1])
         if across < config.sigma_d / 4:

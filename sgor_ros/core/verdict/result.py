@@ -5,12 +5,17 @@ from dataclasses import dataclass
 from dataclasses import field
 from enum import StrEnum
 from typing import Any
+from typing import Literal
+from typing import TYPE_CHECKING
 import warnings
 
 import numpy as np
+from numpy.typing import ArrayLike
 from numpy.typing import NDArray
 
+from ..common.checks import as_numbers
 from ..common.se3 import angle
+from ..common.settings import InputError
 from ..scan.ground import Ground
 from ..scoring.pose_scoring import PoseScore
 from ..solver.solution import Solution
@@ -124,6 +129,42 @@ class Registration:
         """Whether the transformation may be used: the status is REGISTERED."""
         return self.status is Status.REGISTERED
 
+    def transform(self, points: ArrayLike) -> Array:
+        """Return points of the source, (N, 3) or (3,), in the frame of the target, metres.
+
+        Raises
+        ------
+        InputError
+            It is not registered, or other shapes.
+        """
+        T = self.T_target_source
+        if not self.success or T is None:
+            raise InputError(f'transform: not registered: {self.reason}')
+        array = as_numbers(points, 'points')
+        if array.ndim not in (1, 2) or array.shape[-1] != 3:
+            raise InputError(f'points: expected an (N, 3) array, got shape {array.shape}')
+        moved: Array = array.astype(np.float64) @ T[:3, :3].T + T[:3, 3]
+        return moved
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what there is to keep of it as numbers, texts and lists, as JSON has them.
+
+        Correspondences are only counted. A transformation that was refused is left out, for it is
+        nothing to build on; one of several, or one that slides, may be.
+        """
+        T, covariance = self.T_target_source, self.covariance
+        usable = self.success or len(self.degenerate) > 0 or bool(self.alternatives)
+        return {
+            'success': self.success, 'status': self.status.value, 'reason': self.reason,
+            'confidence': self.confidence,
+            'T_target_source': T.tolist() if T is not None and usable else None,
+            'covariance': None if covariance is None else covariance.tolist(),
+            'degenerate': self.degenerate.tolist(),
+            'alternatives': [other.T_target_source.tolist() for other in self.alternatives],
+            'correspondences': len(self.inliers), 'inliers': int(self.inliers.sum()),
+            'score': None if self.score is None else asdict(self.score),
+            'warnings': list(self.warnings), 'timings_s': dict(self.timings)}
+
     def __getattr__(self, name: str) -> Any:
         """Answer to the names of version 0.2, with a warning."""
         if name not in _RENAMED:
@@ -145,6 +186,28 @@ class Registration:
         told += [f'or else {_moved(other.T_target_source)}' for other in self.alternatives]
         told += [f'warning: {warning}' for warning in self.warnings]
         return 'Registration(' + '\n    '.join(told) + ')'
+
+
+if TYPE_CHECKING:
+    class Registered(Registration):
+        """What `success` means to a type checker: there is a transformation."""
+
+        T_target_source: Array
+
+        @property
+        def success(self) -> Literal[True]:
+            """It may be used."""
+
+    class NotRegistered(Registration):
+        """The other case."""
+
+        @property
+        def success(self) -> Literal[False]:
+            """It may not be used."""
+
+    Result = Registered | NotRegistered
+else:
+    Result = Registration
 
 
 _RENAMED: dict[str, tuple[str, Callable[[Registration], Any]]] = {

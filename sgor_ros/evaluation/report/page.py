@@ -5,6 +5,7 @@ import math
 from pathlib import Path
 
 from ...core.common.settings import InputError
+from ...io.writing import free_folder
 from ..front_end import Features
 from ..front_end import shared_matches
 from ..methods import Method
@@ -19,10 +20,42 @@ from .protocol_tables import variant_rows
 from .protocol_tables import whole
 from .tables import markdown
 
+CONTENT = 'page.json'
+PAGE = ('results.md', 'table.tex')
+
 PICTURED = 4
 """Methods of the picture of matches."""
 Z = 1.96
 """Of a 95 % interval."""
+
+
+def keep_earlier(folder: Path, measured: Sequence[Row]) -> str:
+    """Move the page of other pairs or methods into a folder of its own, and return what is told.
+
+    What the page is of is in ``page.json``; the rows of all pairs stay in ``pairs.csv``.
+    """
+    path, now = folder / CONTENT, _content(measured)
+    if path.is_file():
+        before = json.loads(path.read_text())
+    else:    # of older versions nobody knows what they are of
+        before = {} if (folder / PAGE[0]).is_file() else now
+    path.write_text(json.dumps(now, indent=1) + '\n')
+    if before == now:
+        return ''
+    earlier = free_folder(folder / 'earlier')
+    earlier.mkdir()
+    for file in sorted(folder.iterdir()):
+        if file.name in PAGE or file.suffix == '.png':
+            file.rename(earlier / file.name)
+    told = [', '.join(f'{len(value)} {key}' for key, value in of.items()) or 'an older version'
+            for of in (before, now)]
+    return (f'{folder}: the table there was of {told[0]}, this one is of {told[1]}: that one is '
+            f'in {earlier} now')
+
+
+def _content(measured: Sequence[Row]) -> dict[str, list[str]]:
+    return {name: list(dict.fromkeys(getattr(row, name.removesuffix('s')) for row in measured))
+            for name in ('pairs', 'methods', 'variants')}
 
 
 def write(folder: Path, measured: Sequence[Row], protocol: Protocol, methods: Sequence[Method],

@@ -1,4 +1,5 @@
 """Pictures of a track of poses, alone or against ground truth."""
+from collections.abc import Mapping
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from ...io.colours import GROUND
 from ...io.colours import INLIER
 from ...io.colours import LIMIT
 from ...io.colours import LOST
+from ...io.colours import SERIES
 from ...io.colours import SURE
 from ...io.colours import TRUTH
 from ...io.plots import new_figure
@@ -26,6 +28,8 @@ MARGIN_M = 22.0
 # of the longer side, so that a straight drive is no picture of one line's height
 SQUARE_MARGIN = 0.05
 DOTTED = 300
+# of the first, second and so on of several tracks; red is for what is lost
+COLOURS = [colour for colour, _, _ in SERIES if colour != LOST]
 
 
 class LabelledPoints(Protocol):
@@ -42,8 +46,9 @@ class LabelledPoints(Protocol):
 
 def plot_track(path: str | Path, title: str, stamps_s: Sequence[float],
                poses: Sequence[Array | None], seconds: Sequence[float],
-               confidence: Sequence[float]) -> None:
-    """Draw a track from above, and time and confidence of each scan.
+               confidence: Sequence[float], tracks: Sequence[int],
+               truth: Mapping[int, Array]) -> None:
+    """Draw the tracks of a drive from above, and time and confidence of each scan.
 
     Parameters
     ----------
@@ -58,23 +63,33 @@ def plot_track(path: str | Path, title: str, stamps_s: Sequence[float],
         What each scan took; nan where it was not processed.
     confidence : sequence of float
         0 to 1; nan where nothing was registered.
+    tracks : sequence of int
+        Which track each scan belongs to: only poses of one are in one frame.
+    truth : mapping of int to (M, 4, 4) array
+        Where they are known, the true poses in the frame of each track.
     """
     figure = new_figure(13, 6.2)
     grid = figure.add_gridspec(2, 2, width_ratios=(1.15, 1))
     above, upper = figure.add_subplot(grid[:, 0]), figure.add_subplot(grid[0, 1])
     lower = figure.add_subplot(grid[1, 1], sharex=upper)
     figure.suptitle(title, x=0.02, ha='left', weight='bold')
-    known = np.flatnonzero([T is not None for T in poses])
-    track = np.array([T for T in poses if T is not None])
-    xy = track[:, :2, 3]
-    _draw_track(above, xy, 2)
-    for i in np.flatnonzero(np.diff(known) > 1):
-        above.plot(*xy[i:i + 2].T, '-', color=LOST, lw=2.5)
-    _draw_ends(above, xy)
+    known = [i for i, T in enumerate(poses) if T is not None]
+    length_m, several = 0.0, list(dict.fromkeys(tracks[i] for i in known))
+    for number, track in enumerate(several):
+        scans = np.array([i for i in known if tracks[i] == track])
+        part = np.array([poses[i] for i in scans])
+        length_m += travelled_m(part)[-1]
+        if track in truth:
+            above.plot(*truth[track][:, :2, 3].T, '-', color=TRUTH, lw=3.5,
+                       label='' if number else 'ground truth')
+        _draw_one_of(above, part[:, :2, 3], scans, number, len(several))
+    xy = np.array([T[:2, 3] for T in (*poses, *(T for of in truth.values() for T in of))
+                   if T is not None])
     middle, half = (xy.min(axis=0) + xy.max(axis=0)) / 2, np.ptp(xy, axis=0).max() / 2
     half = max(half * (1 + 2 * SQUARE_MARGIN), 1.0)
     _frame(above, middle - half, middle + half)
-    _title(above, f'from above, {travelled_m(track)[-1]:.1f} m')
+    _title(above, f'from above, {length_m:.1f} m' + (
+        f' in {len(several)} tracks, each from its own origin' if len(several) > 1 else ''))
     above.legend(loc='best')
     time_s = np.asarray(stamps_s) - stamps_s[0]
     _draw_times(upper, time_s, np.asarray(seconds),
@@ -155,14 +170,27 @@ def _title(axes: Any, text: str) -> None:
     axes.set_title(text, loc='left', fontsize=10, weight='bold')
 
 
-def _draw_track(axes: Any, xy: Array, width: float) -> None:
+def _draw_one_of(axes: Any, xy: Array, scans: NDArray[np.int_], number: int, count: int) -> None:
+    """Draw one of several tracks in a colour of its own, with red where scans have no pose."""
+    colour = ESTIMATE if count == 1 else COLOURS[number % len(COLOURS)]
+    named = number < len(COLOURS)
+    _draw_track(axes, xy, 2, colour, '' if not named else
+                'track' if count == 1 else f'track {number + 1}')
+    for i in np.flatnonzero(np.diff(scans) > 1):
+        axes.plot(*xy[i:i + 2].T, '-', color=LOST, lw=2.5)
+    _draw_ends(axes, xy, named=number == 0)
+
+
+def _draw_track(axes: Any, xy: Array, width: float, colour: str = ESTIMATE,
+                label: str = 'track') -> None:
     dots = '.-' if len(xy) < DOTTED else '-'
-    axes.plot(*xy.T, dots, color=ESTIMATE, lw=width, ms=4, label='track')
+    axes.plot(*xy.T, dots, color=colour, lw=width, ms=4, label=label)
 
 
-def _draw_ends(axes: Any, xy: Array) -> None:
+def _draw_ends(axes: Any, xy: Array, *, named: bool = True) -> None:
     for end, marker, label in ((xy[0], 'o', 'start'), (xy[-1], 's', 'end')):
-        axes.plot(*end, marker, color='white', mec=TRUTH, mew=2, ms=9, label=label, zorder=5)
+        axes.plot(*end, marker, color='white', mec=TRUTH, mew=2, ms=9, zorder=5,
+                  label=label if named else '')
 
 
 def _frame(axes: Any, low: Array, high: Array) -> None:

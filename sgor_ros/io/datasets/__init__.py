@@ -1,8 +1,10 @@
 """Scans on disk, one file for each layout; which it is, is seen from the path."""
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 
 from ...core.common.settings import InputError
+from ..bags import compressed_or_ros1
 from . import bags
 from . import helipr
 from . import mulran
@@ -12,6 +14,7 @@ from . import scans
 from . import semantickitti
 from .drive import Drive
 from .drive import DriveScan
+from .names import missing_numbers
 
 __all__ = ['Drive', 'DriveScan', 'Frame', 'open_drive', 'open_drives']
 
@@ -67,6 +70,8 @@ def open_drives(path: str | Path) -> list[Drive]:
         return bags.drives(path, path.stem)
     if not path.exists():
         raise InputError(f'{path}: no such file or folder')
+    if advice := compressed_or_ros1(path):
+        raise InputError(f'{path}: {advice}')
     if not path.is_dir():
         raise InputError(f'{path}: neither a bag nor a folder')
     folders = _folders(path)
@@ -79,9 +84,16 @@ def open_drives(path: str | Path) -> list[Drive]:
                 taken.append(folder)
                 found += layout.drives(folder, _name(folder, path))
         if found:
-            return found
+            return [_checked(drive) for drive in found]
     raise InputError(f'{path}: no folder velodyne in it or in {LEVELS} levels below, and nothing '
                      f'else that is a drive: see docs/data.md')
+
+
+def _checked(drive: Drive) -> Drive:
+    """Return the drive with a warning where scans are missing, which times would tell."""
+    if drive.stamps_ns is not None:
+        return drive
+    return replace(drive, warnings=missing_numbers([scan.name for scan in drive.scans]))
 
 
 def _folders(path: Path) -> list[Path]:

@@ -1,7 +1,9 @@
 """The labelled clouds of a bag: one after the other, or in any order."""
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import cached_property
 from functools import partial
+from itertools import islice
 import os
 from pathlib import Path
 import threading
@@ -50,6 +52,7 @@ class BagSequence:
         How many clouds the bag claims to have.
     label_convention : None
         No bag tells.
+    warnings : tuple of str
 
     Raises
     ------
@@ -65,11 +68,19 @@ class BagSequence:
         self._bag = bag
         self._label_field = label_field
         self._time_field = time_field
+        first = [_scan_of(cloud, label_field, time_field).stamp_ns
+                 for cloud in islice(bag.clouds(topic), 2)]
+        self._stampless = first == [0, 0]
+        self.warnings = (('the clouds have no stamps (all are zero): the times of their recording '
+                          'serve',) if self._stampless else ())
 
     def __iter__(self) -> Iterator[StampedScan]:
         """Iterate over the scans; reading one whose message is broken raises InputError."""
         for cloud in self._bag.clouds(self.name):
-            yield _scan_of(cloud, self._label_field, self._time_field)
+            scan = _scan_of(cloud, self._label_field, self._time_field)
+            # a cloud that has one all the same, or is broken, is not another's
+            yield scan if scan.stamp_ns or not self._stampless else replace(
+                scan, stamp_ns=cloud.bag_time_ns)
 
     @cached_property
     def T_world_sensor(self) -> NDArray[np.float64] | None:
@@ -108,7 +119,7 @@ class _OpenBag:
         with self._lock:
             for cloud in self.reader().clouds(topic, recorded_ns):
                 scan = _scan_of(cloud, AUTO, AUTO)
-                if scan.stamp_ns == stamp_ns:
+                if scan.stamp_ns in (stamp_ns, 0):    # of the zeros, times of recording are told
                     return scan.read()
         raise InputError(f'{self._path}: the cloud of {topic} at {stamp_ns} is gone')
 
@@ -143,7 +154,8 @@ def _drive(bag: _OpenBag, topic: str, name: str) -> Drive:
                        partial(bag.read, topic, *both)) for index, both in enumerate(times)]
     stamps = np.array([stamp_ns for _, stamp_ns in times], np.int64)
     return Drive(name, scans, _true_poses(bag.reader(), stamps.tolist()),
-                 stamps_ns=stamps if (np.diff(stamps) > 0).all() else None)
+                 stamps_ns=stamps if (np.diff(stamps) > 0).all() else None,
+                 warnings=sequence.warnings)
 
 
 def _true_poses(bag: BagReader, stamps_ns: list[int]) -> NDArray[np.float64] | None:

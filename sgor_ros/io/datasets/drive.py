@@ -62,6 +62,8 @@ class Drive:
         Whether the heights of the poses are as good as the rest.
     stamps_ns : (N,) int64 or None
         When the scans were taken, nanoseconds, increasing; None where nothing tells.
+    warnings : tuple of str
+        What may be wrong with the drive as a whole, in words.
     """
 
     name: str
@@ -69,6 +71,7 @@ class Drive:
     T_world_sensor: NDArray[np.float64] | None
     heights_known: bool = True
     stamps_ns: NDArray[np.int64] | None = None
+    warnings: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.scans)

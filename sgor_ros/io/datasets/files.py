@@ -1,7 +1,6 @@
 """What the layouts have in common: files in order, and tables with a row for each scan."""
 from collections.abc import Sequence
 from pathlib import Path
-import re
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,21 +8,12 @@ from numpy.typing import NDArray
 from ...core.common import se3
 from ...core.common.settings import InputError
 from .. import trajectories
+from .names import in_order
 
 Array = NDArray[np.float64]
 
-STAMP_DIGITS = 16
-"""A number of so many digits is a time in nanoseconds, not a count of scans."""
-
 NOT_RIGID = 1e-3
 """Poses are written with some digits only; a matrix farther from a rotation is none."""
-
-
-def in_order(paths: Sequence[Path]) -> list[Path]:
-    """Return files in the order of the numbers in their names: 2 before 10."""
-    return sorted(paths, key=lambda path: [
-        (0, int(part), '') if part.isdecimal() else (1, 0, part)
-        for part in re.split(r'([0-9]+)', path.name) if part])
 
 
 def files_in(folder: Path, suffix: str) -> list[Path]:
@@ -91,29 +81,6 @@ def read_times(path: Path, scans: Sequence[Path]) -> NDArray[np.int64]:
     """
     stamps_ns = trajectories.read_times(path)
     return np.array([stamps_ns[row] for row in rows_of(path, len(stamps_ns), scans)], np.int64)
-
-
-def stamps_of_names(scans: Sequence[Path]) -> NDArray[np.int64] | None:
-    """Return the stamps of scans that are named by nanoseconds; None where they are not."""
-    if not all(scan.stem.isdecimal() and len(scan.stem) >= STAMP_DIGITS for scan in scans):
-        return None
-    return increasing([int(scan.stem) for scan in scans], scans[0].parent, scans)
-
-
-def increasing(stamps_ns: Sequence[int], where: Path, scans: Sequence[Path]) -> NDArray[np.int64]:
-    """Return the stamps as an array, if each is later than the one before.
-
-    Raises
-    ------
-    InputError
-        They are not.
-    """
-    stamps = np.array(stamps_ns, np.int64)
-    back = np.flatnonzero(np.diff(stamps) <= 0)
-    if back.size:
-        raise InputError(f'{where}: the time of {scans[back[0] + 1].name} is not after that of '
-                         f'{scans[back[0]].name}')
-    return stamps
 
 
 def read_poses(path: Path, scans: Sequence[Path], calibration: Path | None = None) -> Array:

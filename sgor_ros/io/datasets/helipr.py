@@ -13,7 +13,7 @@ from ...core.scan.scan import SemanticScan
 from .drive import Drive
 from .drive import DriveScan
 from .files import files_in
-from .files import stamps_of_names
+from .names import stamps_of_names
 
 BYTES_A_POINT = {'Ouster': 26, 'Velodyne': 22, 'Avia': 19, 'Aeva': 29}
 """x y z are three float32 at the start of each point; what follows differs."""

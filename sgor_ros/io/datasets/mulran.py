@@ -14,7 +14,7 @@ from .drive import Drive
 from .drive import DriveScan
 from .files import check_rigid
 from .files import files_in
-from .files import stamps_of_names
+from .names import stamps_of_names
 
 T_BASE_SENSOR = se3.compose(
     Rotation.from_euler('xyz', [0.0001, 0.0003, 179.6654], degrees=True).as_matrix(),

@@ -13,7 +13,7 @@ from ...core.common.settings import InputError
 from ..scans import read_scan
 from .drive import Drive
 from .drive import DriveScan
-from .files import increasing
+from .names import increasing
 
 SENSOR = 'samples/LIDAR_TOP/'
 TABLES = ('scene', 'sample', 'sample_data', 'ego_pose', 'calibrated_sensor')

@@ -8,10 +8,10 @@ from ..scans import READERS
 from .drive import Drive
 from .drive import DriveScan
 from .files import calibration
-from .files import in_order
 from .files import read_poses
 from .files import read_times
-from .files import stamps_of_names
+from .names import in_order
+from .names import stamps_of_names
 
 
 def recognises(path: Path) -> bool:

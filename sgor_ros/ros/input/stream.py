@@ -29,6 +29,7 @@ class CloudStream:
     expected = None
     label_convention = None
     T_world_sensor = None
+    warnings = ()
 
     def __init__(self, topic: str, label_field: str, time_field: str) -> None:
         self.name = topic

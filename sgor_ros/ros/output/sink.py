@@ -13,6 +13,7 @@ from ...pipeline.sinks import POSE
 from ...pipeline.sinks import RELATIVE_POSE
 from ...pipeline.sinks import TF
 from ..types import ros_type
+from .acknowledged import Acknowledged
 from .publishers import publisher
 
 TOPICS = {
@@ -29,6 +30,8 @@ MAP_TOPICS = {
     MAP_CLOUD: ('sensor_msgs/msg/PointCloud2', 1),
 }
 """The same where loops are closed."""
+EDGES = (RELATIVE_POSE, LOOP_CLOSURE)
+"""Of a pose graph, which should have all."""
 FOR_LISTENERS = (CORRESPONDENCES, PATH, MAP_CLOUD)
 """Dear, so only made where somebody listens."""
 
@@ -59,6 +62,8 @@ class TopicSink:
         topics = TOPICS | (MAP_TOPICS if loops else {})
         self._publishers = {topic: publisher(node, ros_type(kind), topic, depth)
                             for topic, (kind, depth) in topics.items()}
+        self._edges = {topic: Acknowledged(self._publishers[topic])
+                       for topic in EDGES if topic in self._publishers}
         if tf:
             self._publishers[TF] = publisher(node, _tf_message(), TF, TF_DEPTH)
 
@@ -69,7 +74,14 @@ class TopicSink:
 
     def write(self, topic: str, message: Any, arrived_ns: int) -> None:
         """Publish a message."""
+        if topic in self._edges:
+            self._edges[topic].expect_one()
         self._publishers[topic].publish(message)
+
+    @property
+    def unacknowledged_edges(self) -> int:
+        """Edges that left the queue before each reliable subscriber had acknowledged them."""
+        return sum(edges.overdue for edges in self._edges.values())
 
 
 def _tf_message() -> Any:

@@ -81,3 +81,22 @@ def test_warm_up_compiles_everything_elsewhere(fresh):
     assert done.stdout == 'False True []\n'
     assert done.stderr.count(WORD) == 1
     assert run(WARM_UP, fresh).stdout == 'True True []\n'
+
+
+@pytest.mark.parametrize('kind', ['nbi', 'nbc'])
+@pytest.mark.parametrize('damage', ['cut', 'emptied', 'zeroed'])
+def test_a_damaged_cache_is_made_again(fresh, kind, damage):
+    """As a full disk or a power cut leaves it; once, and the rest stays as it is."""
+    files = sorted(Path(fresh['NUMBA_CACHE_DIR']).rglob(f'*.{kind}'))
+    chosen = next(path for path in files if '_icp' in path.name)
+    whole = chosen.read_bytes()
+    other = next(path for path in files if path.parent != chosen.parent)
+    before = other.stat().st_mtime_ns
+    chosen.write_bytes({'cut': whole[:len(whole) // 2], 'emptied': b'',
+                        'zeroed': bytes(len(whole))}[damage])
+    done = run(WARM_UP, fresh)
+    assert done.stdout == 'False True []\n'
+    assert '1 files of compiled code were damaged: they are made again' in done.stderr
+    assert len(chosen.read_bytes()) == pytest.approx(len(whole), rel=0.02)
+    assert other.stat().st_mtime_ns == before
+    assert run(WARM_UP, fresh).stdout == 'True True []\n'
