@@ -124,7 +124,8 @@ class Tracker:
             scale_before=self._reference.prepared.scale if self._reference else None,
             up_before=self._up)
         self._up = prepared.ground.normal if prepared.ground else None
-        prepared = replace(prepared, frame_covariance=frame_covariance)
+        if frame_covariance is not None:
+            prepared = replace(prepared, frame_covariance=frame_covariance)
         new = ScanAtWork(prepared, stamp_ns, [*warnings, *prepared.warnings],
                          dict(prepared.timings), middle_s=middle_s,
                          deskewed_by=self._sweep.twist if self._sweep else None)
