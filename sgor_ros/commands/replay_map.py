@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ..core.common import se3
 from ..evaluation.metrics.trajectory import ape
+from ..evaluation.metrics.trajectory import rmse
 from ..evaluation.report.loop_plots import plot_loops
 from ..io.g2o import write_g2o
 from ..io.g2o import write_stamps
@@ -79,5 +80,5 @@ def write_map(folder: Path, mapper: Mapper, rows: list[Row], T_base_sensor: Arra
                          for i in known])
         for name, trajectory in (('before', before), ('after', after)):
             _, metres = ape(trajectory.T_map_sensor[known], true)
-            summary[f'ape_{name}_m'] = round(float(np.sqrt(np.mean(metres**2))), 4)
+            summary[f'ape_{name}_m'] = round(rmse(metres), 4)
     return summary

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ..core.common import se3
 from ..core.common.settings import InputError
 from ..evaluation.metrics.trajectory import KITTI_LENGTHS_M
+from ..evaluation.metrics.trajectory import rmse
 from ..evaluation.metrics.trajectory import STRETCHES_M
 from ..evaluation.metrics.trajectory import track_errors
 from ..evaluation.metrics.trajectory import travelled_m
@@ -100,9 +101,10 @@ def compared(rows: Sequence[Row], truth: Truth, T_base_sensor: Array
                              else STRETCHES_M)
         errors.append({
             'track': track, 'poses': len(pairs), 'length_m': round(length_m, 3),
-            'ape_rmse_m': _rmse(found.ape_m), 'ape_max_m': round(float(found.ape_m.max()), 4),
-            'rpe_translation_rmse_m': _rmse(found.translation_m),
-            'rpe_rotation_rmse_deg': _rmse(found.rotation_deg),
+            'ape_rmse_m': round(rmse(found.ape_m), 4),
+            'ape_max_m': round(float(found.ape_m.max()), 4),
+            'rpe_translation_rmse_m': round(rmse(found.translation_m), 4),
+            'rpe_rotation_rmse_deg': round(rmse(found.rotation_deg), 4),
             'drift_translation_percent': _number(found.drift.translation_percent),
             'drift_rotation_deg_per_m': _number(found.drift.rotation_deg_per_m),
             'drift_stretches': found.drift.stretches})
@@ -122,10 +124,6 @@ def in_words(errors: Sequence[dict[str, Any]]) -> list[str]:
                      f'{error["rpe_translation_rmse_m"]:.3f} m and '
                      f'{error["rpe_rotation_rmse_deg"]:.3f} deg (RMSE){drift}')
     return lines
-
-
-def _rmse(errors: Array) -> float:
-    return round(float(np.sqrt(np.mean(errors**2))), 4)
 
 
 def _number(value: float) -> float | None:

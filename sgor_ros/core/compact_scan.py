@@ -15,6 +15,8 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from .common.checks import as_laid_out
+from .common.checks import Layout
 from .common.settings import InputError
 from .config import SgorConfig
 from .execution.lazy import Lazy
@@ -34,8 +36,7 @@ from .scan.labels import label_convention
 VERSION = 1
 """Of the arrays; another one is refused."""
 CELLS = AZIMUTHS * ELEVATIONS
-# name -> type and shape; a letter stands for the same length wherever it is
-ARRAYS: dict[str, tuple[type, tuple[int | str, ...]]] = {
+ARRAYS: Layout = {
     'points': (np.float64, ('V', 3)), 'normals': (np.float64, ('V', 3)),
     'labels': (np.uint8, ('V',)), 'regional': (np.uint8, ('V',)),
     'descriptors': (np.float32, ('V', 'D')), 'context_classes': (np.uint8, ('C',)),
@@ -111,8 +112,7 @@ class CompactScan:
             raise InputError(f'about: not of a compact scan ({error!r})') from error
         if version != VERSION:
             raise InputError(f'version = {version!r}: this program reads version {VERSION}')
-        lengths: dict[str, int] = {}
-        found = {name: _checked(arrays, name, lengths) for name in ARRAYS}
+        found, lengths = as_laid_out(arrays, ARRAYS)
         try:
             made = cls(SgorConfig.from_values(about['config']), float(about['scale']),
                        str(about['ground_source']), bool(about['ground_certain']), found)
@@ -199,20 +199,3 @@ def _surface(arrays: dict[str, NDArray[Any]]) -> Surface | None:
     columns = in_columns(points, edge)
     return Surface(columns, arrays['surface_normals'].astype(np.float64)[columns.order],
                    middle_range)
-
-
-def _checked(arrays: Mapping[str, NDArray[Any]], name: str, lengths: dict[str, int]
-             ) -> NDArray[Any]:
-    """Return an array of the right type and shape, with finite numbers."""
-    kind, shape = ARRAYS[name]
-    if name not in arrays:
-        raise InputError(f'{name}: missing')
-    array = arrays[name]
-    expected = tuple(side if isinstance(side, int) else lengths.setdefault(side, have)
-                     for side, have in zip(shape, array.shape, strict=False))
-    if array.dtype != kind or array.shape != expected or len(shape) != array.ndim:
-        raise InputError(f'{name}: expected {np.dtype(kind)} {shape}, got {array.dtype} '
-                         f'{array.shape}')
-    if array.dtype.kind == 'f' and not np.isfinite(array).all():
-        raise InputError(f'{name}: not all are finite')
-    return np.ascontiguousarray(array)

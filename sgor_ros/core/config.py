@@ -1,4 +1,5 @@
 """The settings of SGOR: one home for each default, with unit, meaning and bounds."""
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 import math
@@ -146,6 +147,16 @@ one."""
 def prepares_alike(one: SgorConfig, other: SgorConfig) -> bool:
     """Return whether a scan prepared with one configuration serves the other."""
     return all(getattr(one, name) == getattr(other, name) for name in (*PREPARATION, 'scale'))
+
+
+def first_difference(one: SgorConfig, other: SgorConfig, names: Sequence[str] = PREPARATION
+                     ) -> str:
+    """Return the first setting that scans of both cannot be registered for; empty: none.
+
+    Label conventions may differ: labels are classes by then.
+    """
+    return next((name for name in names if name != 'label_convention'
+                 and getattr(one, name) != getattr(other, name)), '')
 
 
 @lru_cache(maxsize=32)

@@ -6,7 +6,7 @@ from numpy.typing import ArrayLike
 from numpy.typing import NDArray
 
 from .common.settings import InputError
-from .config import PREPARATION
+from .config import first_difference
 from .config import SgorConfig
 from .execution.lazy import Lazy
 from .features.features import Features
@@ -83,11 +83,10 @@ class PreparedScan:
         InputError
             Naming the first setting that differs.
         """
-        for item in PREPARATION:
+        if item := first_difference(self.config, config):
             mine, asked = getattr(self.config, item), getattr(config, item)
-            if mine != asked and item != 'label_convention':
-                raise InputError(f'{name}: prepared with {item} = {mine!r}, not with {asked!r}; '
-                                 'preprocess it with the configuration of the registration')
+            raise InputError(f'{name}: prepared with {item} = {mine!r}, not with {asked!r}; '
+                             'preprocess it with the configuration of the registration')
 
     def raw(self, why: str) -> SemanticScan:
         """Return the scan, which is to be prepared again.

@@ -17,6 +17,7 @@ from .metrics.pose_error import nees
 from .metrics.pose_error import rotation_error_deg
 from .metrics.pose_error import translation_error_m
 from .metrics.trajectory import ape
+from .metrics.trajectory import rmse
 from .metrics.trajectory import travelled_m
 
 Array = NDArray[np.float64]
@@ -123,4 +124,4 @@ def _ape(mapper: Mapper, truth: dict[int, Array], *, loops: bool) -> float:
     stamps_ns = found.stamps_ns[joined].tolist()
     origin = se3.inverse(truth[stamps_ns[0]])
     _, metres = ape(found.T_map_sensor[joined], [origin @ truth[stamp] for stamp in stamps_ns])
-    return float(np.sqrt(np.mean(metres**2)))
+    return rmse(metres)

@@ -1,4 +1,5 @@
 """Which field of a cloud holds the class ids, where that is left to us."""
+from collections.abc import Sequence
 from typing import Any
 
 from ..core.scan.point_clouds import LABEL_FIELDS
@@ -21,12 +22,16 @@ def label_field_of(message: Any, wanted: str) -> str:
         What the user says: a name, whether the cloud has it or not; ``'auto'`` for the first of
         `LABEL_FIELDS` that the cloud has; ``'none'`` or empty for none.
     """
+    return chosen_field(wanted, LABEL_FIELDS, field_names(message))
+
+
+def chosen_field(wanted: str, known: Sequence[str], there: Sequence[str]) -> str:
+    """Return the field that is wanted; of ``'auto'`` the first known one that is there."""
     if wanted in ('', NONE):
         return ''
     if wanted != AUTO:
         return wanted
-    there = field_names(message)
-    return next((name for name in LABEL_FIELDS if name in there), '')
+    return next((name for name in known if name in there), '')
 
 
 def choice_in_words(message: Any, wanted: str) -> str:

@@ -11,6 +11,8 @@ import zlib
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.common.checks import as_laid_out
+from ..core.common.checks import Layout
 from ..core.common.settings import InputError
 from ..core.common.settings import Settings
 from ..core.compact_scan import CompactScan
@@ -36,13 +38,12 @@ INDEX = 'map.json'
 SETTINGS: dict[str, type[Settings]] = {'config': SgorConfig, 'tracker_config': TrackerConfig,
                                        'mapper_config': MapperConfig}
 KINDS = list(Kind)
-# name -> type and shape; a letter stands for the same length wherever it is
-GRAPH: dict[str, tuple[type, tuple[int | str, ...]]] = {
+GRAPH: Layout = {
     'nodes': (np.int64, ('N',)), 'stamps_ns': (np.int64, ('N',)), 'sessions': (np.int64, ('N',)),
     'T_map_sensor': (np.float64, ('N', 4, 4)), 'targets': (np.int64, ('E',)),
     'sources': (np.int64, ('E',)), 'T_target_source': (np.float64, ('E', 4, 4)),
     'covariances': (np.float64, ('E', 6, 6)), 'kinds': (np.uint8, ('E',))}
-KEYFRAMES: dict[str, tuple[type, tuple[int | str, ...]]] = {
+KEYFRAMES: Layout = {
     'nodes': (np.int64, ('K',)), 'track_ids': (np.int64, ('K',)),
     'descriptors': (np.float32, ('K', 'D')),
     # of a scan that was not deskewed all zero
@@ -254,23 +255,15 @@ def _check_size(file: StoredFile) -> None:
         raise InputError(f'{file.path}: damaged: {size} bytes, expected {file.size}')
 
 
-def _read(files: Mapping[str, StoredFile], path: Path,
-          expected: dict[str, tuple[type, tuple[int | str, ...]]]) -> Arrays:
+def _read(files: Mapping[str, StoredFile], path: Path, layout: Layout) -> Arrays:
     """Return the arrays of a file, of the right types and shapes."""
     if path.name not in files:
         raise InputError(f'{path.parent / INDEX}: {path.name} is not in it')
-    arrays, lengths = _arrays(path, files[path.name].content()), dict[str, int]()
-    for name, (kind, shape) in expected.items():
-        if name not in arrays:
-            raise InputError(f'{path}: {name}: missing')
-        array = arrays[name]
-        sides = tuple(side if isinstance(side, int) else lengths.setdefault(side, have)
-                      for side, have in zip(shape, array.shape, strict=False))
-        if array.dtype != kind or array.shape != sides or array.ndim != len(shape):
-            raise InputError(f'{path}: {name}: {array.dtype} {array.shape}')
-        if array.dtype.kind == 'f' and not np.isfinite(array).all():
-            raise InputError(f'{path}: {name}: not all are finite')
-    return arrays
+    arrays = _arrays(path, files[path.name].content())
+    try:
+        return as_laid_out(arrays, layout)[0]
+    except InputError as error:
+        raise InputError(f'{path}: {error}') from error
 
 
 def _npz(arrays: Arrays) -> bytes:

@@ -5,8 +5,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.common.settings import InputError
-from .label_field import AUTO
-from .label_field import NONE
+from .label_field import chosen_field
 
 TIME_FIELDS = ('t', 'time', 'timestamp', 'time_stamp', 'offset_time')
 """In this order: Ouster; Velodyne; Hesai, RoboSense and Livox; others; Livox's own message."""
@@ -30,13 +29,9 @@ def time_field_of(message: Any, wanted: str) -> str:
         What the user says: a name; ``'auto'`` for the first of `TIME_FIELDS` that the cloud has;
         ``'none'`` or empty for none.
     """
-    if wanted in ('', NONE):
-        return ''
-    if wanted != AUTO:
-        return wanted
-    there = [field.name for field in message.fields
-             if field.datatype in NUMBERS and field.count == 1]
-    return next((name for name in TIME_FIELDS if name in there), '')
+    return chosen_field(wanted, TIME_FIELDS, [
+        field.name for field in message.fields
+        if field.datatype in NUMBERS and field.count == 1])
 
 
 def seconds_since(stamp_ns: int, times: NDArray[Any], name: str) -> NDArray[np.float64] | None:

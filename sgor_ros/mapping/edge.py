@@ -10,6 +10,10 @@ from ..core.common import se3
 Array = NDArray[np.float64]
 
 
+NO_NODE = -1
+"""In place of the node of a scan that is in no graph."""
+
+
 class Kind(StrEnum):
     """Where an edge comes from."""
 

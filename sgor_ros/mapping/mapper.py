@@ -23,6 +23,7 @@ from .candidates import Surroundings
 from .config import MapperConfig
 from .edge import Edge
 from .edge import Kind
+from .edge import NO_NODE
 from .loop_consistency import LoopConsistency
 from .maps.map import Map
 from .maps.map import MapNode
@@ -36,8 +37,6 @@ from .verification import Verification
 
 Array = NDArray[np.float64]
 
-NOWHERE = -1
-"""In place of the node of a scan that has none."""
 FROM_A_MAP = 0
 """In place of the track of nodes that were there before; those of the tracker count from 1."""
 
@@ -245,8 +244,8 @@ class Mapper:
             return False
         prepared = preprocess(scan, self.tracker.config)
         alike = list(self.keyframes.alike(prepared))[:count]
-        found = [Edge(target, NOWHERE, *seen, Kind.LOOP) for target in alike if (
-            seen := self._verification.one(Candidate(NOWHERE, prepared, target), self.keyframes,
+        found = [Edge(target, NO_NODE, *seen, Kind.LOOP) for target in alike if (
+            seen := self._verification.one(Candidate(NO_NODE, prepared, target), self.keyframes,
                                            self.tracker.config)) is not None]
         if not any(self.consistency.agree(*pair) for pair in combinations(found, 2)):
             return False

@@ -9,7 +9,7 @@ from ..core.common import se3
 from ..core.common.settings import InputError
 from ..tracker import TrackedScan
 from ..tracker import TrackerConfig
-from ..tracker.choice import UNKNOWN_COVARIANCE
+from ..tracker.choice import or_unknown
 from .edge import Edge
 from .pose_graph import PoseGraph
 from .result import Trajectory
@@ -151,7 +151,7 @@ def edge_between(target: Node, source: Node, step: Array | None = None) -> Edge:
     """
     T = se3.inverse(target.T_odom_sensor) @ source.T_odom_sensor
     if target.covariance is None or source.covariance is None:
-        covariance = UNKNOWN_COVARIANCE if step is None else step
+        covariance = or_unknown(step)
     else:
         carry = se3.carried(source.T_odom_sensor[:3, 3] - target.T_odom_sensor[:3, 3])
         back = se3.turned(target.T_odom_sensor[:3, :3].T)

@@ -3,6 +3,7 @@
 Errors of edges are as everywhere in this package, position and rotation each by itself in the
 target frame; GTSAM has rotation first, both in the frame of the source. See docs/pose_graph.md.
 """
+from collections import Counter
 from collections.abc import Iterable
 from collections.abc import Mapping
 from collections.abc import Sequence
@@ -97,7 +98,7 @@ class PoseGraph:
     def largest_part(self, of: int | None = None) -> dict[int, Array]:
         """Return nodes with their poses: of the part with the most, or of that which one is in."""
         parts = [self.part(node) for node in (self.nodes if of is None else [of])]
-        part = max(parts, key=parts.count, default=None)
+        part = next((part for part, _ in Counter(parts).most_common(1)), None)
         return {node: self.pose(node) for node in self.nodes if self.part(node) == part}
 
     def add_origin(self, node: int, T_map_sensor: Array) -> None:

@@ -178,7 +178,7 @@ def _information(placement: Placement, besides: Array | float = 0.0) -> Array:
     `besides` is added to its covariance. Never negative, whatever the directions are: they are
     projected out of a square root of the information.
     """
-    covariance = UNKNOWN_COVARIANCE if placement.covariance is None else placement.covariance
+    covariance = or_unknown(placement.covariance)
     root = np.linalg.inv(np.linalg.cholesky(covariance + besides))    # root^T root: information
     if len(placement.degenerate):
         free = root @ placement.degenerate.T
@@ -199,6 +199,6 @@ def _along(degenerate: Array) -> str:
         for row in degenerate)
 
 
-def registered_covariance(found: Registration | None) -> Array:
-    """Return the (6, 6) covariance of a registration, or what to take where it has none."""
-    return UNKNOWN_COVARIANCE if found is None or found.covariance is None else found.covariance
+def or_unknown(covariance: Array | None) -> Array:
+    """Return a (6, 6) covariance, or what to take where there is none."""
+    return UNKNOWN_COVARIANCE if covariance is None else covariance

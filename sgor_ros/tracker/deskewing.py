@@ -11,6 +11,8 @@ from ..core.prepared_scan import PreparedScan
 from ..core.preprocessing import preprocess
 from ..core.scan.deskewing import deskewed
 from ..core.scan.scan import SemanticScan
+from .config import TrackerConfig
+from .motion import Motion
 
 Array = NDArray[np.float64]
 
@@ -78,7 +80,7 @@ class Sweep:
         return replace(other, twist=twist, twist_covariance=covariance, changes=changes)
 
 
-def by_expected_motion(scan: SemanticScan, sweep: Sweep | None, unknown: Array
+def by_expected_motion(scan: SemanticScan, sweep: Sweep | None, config: TrackerConfig
                        ) -> tuple[SemanticScan, Array | None]:
     """Return a scan deskewed by the velocity of the sweep before.
 
@@ -87,8 +89,8 @@ def by_expected_motion(scan: SemanticScan, sweep: Sweep | None, unknown: Array
     scan : SemanticScan
     sweep : Sweep or None
         The one before. Where it has no velocity the scan stays as it is.
-    unknown : (6, 6) array
-        Covariance of a twist that nobody has measured.
+    config : TrackerConfig
+        Its bounds are what is known of a velocity that nobody has measured.
 
     Returns
     -------
@@ -99,7 +101,8 @@ def by_expected_motion(scan: SemanticScan, sweep: Sweep | None, unknown: Array
     if scan.times is None:
         return scan, None
     if sweep is None or sweep.twist is None or sweep.twist_covariance is None:
-        return scan, _frame_covariance(scan.times, unknown)
+        unknown = Motion.unknown(0, np.eye(4), np.zeros((6, 6)), config)
+        return scan, _frame_covariance(scan.times, unknown.twist_covariance)
     return deskewed(scan, sweep.twist), _frame_covariance(
         scan.times, sweep.twist_covariance + np.diag(LAG**2 * sweep.changes))
 

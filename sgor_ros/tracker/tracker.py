@@ -15,11 +15,10 @@ from ..core.scan.scan import SemanticScan
 from ..core.verdict.result import Registration
 from .choice import choose
 from .choice import is_likely
+from .choice import or_unknown
 from .choice import refined
-from .choice import registered_covariance
 from .choice import relocalised
 from .choice import Step
-from .choice import UNKNOWN_COVARIANCE
 from .config import TrackerConfig
 from .covariance import PoseCovariance
 from .deskewing import by_expected_motion
@@ -117,8 +116,7 @@ class Tracker:
     def _process(self, scan: SemanticScan, stamp_ns: int, warnings: list[str]) -> TrackedScan:
         """Find the pose of a scan that is on time."""
         middle_s = None if scan.times is None else float(scan.times.mean())
-        unknown = Motion.unknown(stamp_ns, np.eye(4), np.zeros((6, 6)), self.tracker_config)
-        scan, frame_covariance = by_expected_motion(scan, self._sweep, unknown.twist_covariance)
+        scan, frame_covariance = by_expected_motion(scan, self._sweep, self.tracker_config)
         prepared = preprocess(
             scan, self.config,
             scale_before=self._reference.prepared.scale if self._reference else None,
@@ -281,8 +279,9 @@ class Tracker:
                 and 0 < seconds < LONGEST_STEP_S):
             return step
         bent, registration = new.prepared, new.registration
+        assert registration is not None
         twist = se3.log(step.T_reference_sensor) / seconds
-        covariance = registered_covariance(registration) / seconds**2
+        covariance = or_unknown(registration.covariance) / seconds**2
         new.prepared = by_step(bent, twist, covariance)
         again = self._step(new, replace(
             reference, prepared=by_step(reference.prepared, twist, covariance)))
@@ -320,7 +319,7 @@ class Tracker:
         T_odom_sensor = keyframe.T_odom_sensor @ T
         if new.middle_s is not None:
             sweep = Sweep.of(self._track_id, new.stamp_ns, T_odom_sensor,
-                             registered_covariance(new.registration), new.deskewed_by,
+                             or_unknown(new.registration.covariance), new.deskewed_by,
                              new.middle_s)
             self._sweep = self._sweep.then(sweep) if self._sweep else sweep
         covariance = None
@@ -352,7 +351,7 @@ class Tracker:
     def _move(self, new: ScanAtWork, keyframe: Keyframe, step: Step) -> bool:
         """Take in the motion of a step; return whether the velocity is known."""
         assert self._reference is not None
-        covariance = UNKNOWN_COVARIANCE if step.covariance is None else step.covariance
+        covariance = or_unknown(step.covariance)
         before = self._motion
         if step.fused is not None:
             self._motion = step.fused

@@ -1,4 +1,5 @@
 """Arrays at the door: the right shape and type, or an error that names the field."""
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -54,6 +55,39 @@ def as_labels(labels: ArrayLike, length: int, name: str) -> NDArray[np.int64]:
     if array.dtype.kind not in 'iu':    # to numpy, spans of time are integers
         raise InputError(f'{name}: expected integers, got {array.dtype}')
     return array.astype(np.int64, copy=False)
+
+
+Layout = dict[str, tuple[type, tuple[int | str, ...]]]
+"""Name to type and shape of arrays; a letter stands for the same length wherever it is."""
+
+
+def as_laid_out(arrays: Mapping[str, NDArray[Any]], layout: Layout
+                ) -> tuple[dict[str, NDArray[Any]], dict[str, int]]:
+    """Return the arrays of a layout with finite numbers, and the length of each letter.
+
+    Raises
+    ------
+    InputError
+        Naming the array that is missing, or of another type or shape.
+    """
+    lengths: dict[str, int] = {}
+    return {name: _laid_out(arrays, name, kind, shape, lengths)
+            for name, (kind, shape) in layout.items()}, lengths
+
+
+def _laid_out(arrays: Mapping[str, NDArray[Any]], name: str, kind: type,
+              shape: tuple[int | str, ...], lengths: dict[str, int]) -> NDArray[Any]:
+    if name not in arrays:
+        raise InputError(f'{name}: missing')
+    array = arrays[name]
+    expected = tuple(side if isinstance(side, int) else lengths.setdefault(side, have)
+                     for side, have in zip(shape, array.shape, strict=False))
+    if array.dtype != kind or array.shape != expected or len(shape) != array.ndim:
+        raise InputError(f'{name}: expected {np.dtype(kind)} {shape}, got {array.dtype} '
+                         f'{array.shape}')
+    if array.dtype.kind == 'f' and not np.isfinite(array).all():
+        raise InputError(f'{name}: not all are finite')
+    return np.ascontiguousarray(array)
 
 
 def finite_points(points: ArrayLike, name: str) -> NDArray[np.float64]:

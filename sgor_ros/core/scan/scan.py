@@ -87,9 +87,9 @@ class SemanticScan:
             exact, clean = exact[finite], clean[finite]
             ids = None if ids is None else ids[finite]
             taken = None if taken is None else taken[finite]
-        if taken is not None and not (np.abs(taken) < LONGEST_SWEEP).all():
-            raise InputError(f'times: {taken[np.argmax(~(np.abs(taken) < LONGEST_SWEEP))]:g}, '
-                             f'expected seconds, within {LONGEST_SWEEP:g} of the stamp')
+        if taken is not None and (bad := ~(np.abs(taken) < LONGEST_SWEEP)).any():
+            raise InputError(f'times: {taken[np.argmax(bad)]:g}, expected seconds, within '
+                             f'{LONGEST_SWEEP:g} of the stamp')
         object.__setattr__(self, 'points', clean)
         object.__setattr__(self, 'labels', ids)
         object.__setattr__(self, 'origin',

@@ -75,6 +75,11 @@ class Drift:
     stretches: int
 
 
+def rmse(errors: Array) -> float:
+    """Return the root of the mean square."""
+    return float(np.sqrt(np.mean(errors**2)))
+
+
 def travelled_m(T_world_sensor: ArrayLike) -> Array:
     """Return the (N,) way travelled up to each of (N, 4, 4) poses, metres."""
     positions = np.asarray(T_world_sensor, np.float64)[:, :3, 3]

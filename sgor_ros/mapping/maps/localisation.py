@@ -24,6 +24,7 @@ from ...core.verdict.result import Status
 from ...tracker.deskewing import with_frames
 from ..edge import Edge
 from ..edge import Kind
+from ..edge import NO_NODE
 from .result import Located
 from .result import Place
 
@@ -47,8 +48,6 @@ AGREE_M, AGREE_RAD = 0.5, np.radians(3.0)
 """Answers of two keyframes of one place differ by no more; the map may be bent as far."""
 HINTED = 3
 """Keyframes near a hint that come first."""
-NOBODY = -1
-"""In place of the node of a scan that is in no graph."""
 
 
 class Search:
@@ -137,7 +136,7 @@ class Search:
                         node) for T, covariance in placements]
         T, covariance = placements[0]
         if found.success and covariance is not None:
-            self.answers.append((places[0], Edge(node, NOBODY, T, covariance, Kind.LOOP)))
+            self.answers.append((places[0], Edge(node, NO_NODE, T, covariance, Kind.LOOP)))
             return places[0]
         if found.status in (Status.AMBIGUOUS, Status.DEGENERATE):
             self.unsure += [(found.status, place) for place in places]

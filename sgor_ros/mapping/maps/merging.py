@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ...core.common import se3
 from ...core.common.settings import InputError
+from ...core.config import first_difference
 from ...core.config import PREPARATION
 from ...core.config import SgorConfig
 from ..edge import Edge
@@ -104,10 +105,9 @@ def check_alike(one: SgorConfig, other: SgorConfig, name: str, other_name: str) 
     InputError
         Naming the setting that differs.
     """
-    for item in (*PREPARATION, 'scale'):
+    if item := first_difference(one, other, (*PREPARATION, 'scale')):
         mine, its = getattr(one, item), getattr(other, item)
-        if mine != its and item != 'label_convention':
-            raise InputError(f'{name}: {item} = {mine!r}, but {other_name} was made with {its!r}')
+        raise InputError(f'{name}: {item} = {mine!r}, but {other_name} was made with {its!r}')
 
 
 def _agreeing(located: dict[int, list[Edge]], consistency: LoopConsistency) -> list[int]:
