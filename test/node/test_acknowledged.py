@@ -42,14 +42,16 @@ def test_messages_that_leave_the_queue_unacknowledged_are_counted(domain):
                 publisher.publish(String(data=str(number)))
                 time.sleep(pause_s)
 
-        publish(3 * DEPTH, 0.02)
+        for _ in range(3 * DEPTH):
+            publish(1, 0.0)
+            until_acknowledged(publisher)
         assert edges.overdue == 0
         slow.send_signal(signal.SIGSTOP)
         time.sleep(0.5)
         publish(3 * DEPTH, 0.001)
         told = edges.overdue
         slow.send_signal(signal.SIGCONT)
-        until(lambda: publisher.wait_for_all_acked(rclpy.duration.Duration(seconds=0.1)))
+        until_acknowledged(publisher)
         publish(DEPTH, 0.02)
         assert edges.overdue == told, 'it keeps up again'
         time.sleep(1.0)
@@ -61,6 +63,10 @@ def test_messages_that_leave_the_queue_unacknowledged_are_counted(domain):
     finally:
         slow.kill()
         rclpy.shutdown(context=context)
+
+
+def until_acknowledged(publisher):
+    until(lambda: publisher.wait_for_all_acked(rclpy.duration.Duration(seconds=0.1)))
 
 
 def until(done):
