@@ -119,13 +119,13 @@ def export(arguments: Namespace) -> int:
     check_file(output, 'OUTPUT', EXPORTS)
     known = _loaded(arguments.map)
     if output.suffix.lower() == '.yaml':
-        grid = occupancy_grid(known.scans(), arguments.resolution)
+        grid = occupancy_grid(known.scans(of_base=True), arguments.resolution)
         write_grid(output, grid)
         height, width = grid.cells.shape
         print(f'{width} x {height} cells of {grid.resolution:g} m; wrote {output} and '
               f'{output.with_suffix(".pgm")}')
         return OK
-    points, labels = joined_cloud(known.scans())
+    points, labels = joined_cloud(known.scans(of_base=True))
     write = write_map_ply if output.suffix.lower() == '.ply' else write_map_pcd
     with new_file(output) as place:
         write(place, points, labels)

@@ -77,12 +77,18 @@ class OdomFrame:
 
     The frame that is published, base or sensor, begins a track at the origin of the odom frame,
     or where `begin_at` says.
+
+    Attributes
+    ----------
+    T_map_mapper : (4, 4) float64 or None
+        Where the frame of the mapper, that of its first sensor, lies in the map that is published;
+        it is set with the first pose, where nobody has.
     """
 
     def __init__(self) -> None:
         self._starts: dict[int, _Start] = {}
         self._next: tuple[Array, Array] | None = None
-        self._T_map_first: Array | None = None
+        self.T_map_mapper: Array | None = None
 
     def begin_at(self, T_odom_child: Array, covariance: Array) -> None:
         """Let the next track begin at a pose of the frame that is published."""
@@ -98,8 +104,8 @@ class OdomFrame:
 
     def in_map(self, T_first_sensor: Array) -> Array:
         """Return poses (..., 4, 4) in the frame of the mapper, of the first scan, in the map."""
-        assert self._T_map_first is not None, 'a track has been placed'
-        return self._T_map_first @ T_first_sensor
+        assert self.T_map_mapper is not None, 'a track has been placed'
+        return self.T_map_mapper @ T_first_sensor
 
     def map_to_odom(self, track_id: int, T_map_track: Array) -> Array:
         """Return the pose of the odom frame in the map, (4, 4).
@@ -128,8 +134,8 @@ class OdomFrame:
             # tracks that can come back are few
             self._starts = dict(list(self._starts.items())[-REMEMBERED:])
             start = self._starts[tracked.track_id] = _Start(T @ mount, T, covariance)
-            if self._T_map_first is None:
-                self._T_map_first = start.T_odom_sensor
+            if self.T_map_mapper is None:
+                self.T_map_mapper = start.T_odom_sensor
         return _doubted(of_base(in_odom(tracked, start.T_odom_sensor), mount), start)
 
     def of_sensor(self, tracked: TrackedScan) -> TrackedScan:

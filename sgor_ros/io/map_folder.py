@@ -32,8 +32,10 @@ from .writing import replaced_folder
 
 Arrays = dict[str, NDArray[Any]]
 
-FORMAT, VERSION = 'sgor_ros map', 1
-"""Of the folder; another version is refused."""
+FORMAT, VERSION = 'sgor_ros map', 2
+"""Of the folder, as it is written."""
+READABLE = (1, VERSION)
+"""Others are refused. In version 1 nothing is told of the mount of the sensor."""
 INDEX = 'map.json'
 SETTINGS: dict[str, type[Settings]] = {'config': SgorConfig, 'tracker_config': TrackerConfig,
                                        'mapper_config': MapperConfig}
@@ -50,7 +52,8 @@ KEYFRAMES: Layout = {
     'frame_covariances': (np.float64, ('K', 6, 6))}
 README = """A map of sgor_ros: `sgor_ros.Map.load` reads it, `sgor_map show` draws it.
 
-map.json       version, settings that it was made with, size and CRC-32 of every file
+map.json       version, settings that it was made with, size and CRC-32 of every file, and the
+               mount of the sensor (T_base_sensor, row by row; null where nobody told)
 graph.npz      nodes (stamp, session, pose in the map) and edges (relative pose, covariance)
 keyframes.npz  what the keyframes look like, for place recognition
 keyframes/     a scan each, by the number of its node: numpy.load reads it, without pickle
@@ -58,6 +61,11 @@ poses.tum      the poses of all nodes, for people and tools: seconds x y z qx qy
 graph.g2o      nodes and edges, likewise
 
 poses.tum, graph.g2o and this file are written and not read. Metres, radians, nanoseconds.
+
+Poses are those of the sensor, in the frame of the first scan, which is tilted where the sensor is.
+T_base_sensor times a pose lies in the frame of the vehicle, x forward and z up. The node publishes
+in that frame, and `sgor_map export` writes clouds and grids in it; without a mount the frame of
+the first scan takes its place.
 """
 TEXTS = ('README.txt', 'poses.tum', 'graph.g2o')
 
@@ -160,6 +168,8 @@ def read_map(folder: str | Path) -> dict[str, Any]:
         files = {name: StoredFile(folder / name, int(size), int(crc32))
                  for name, (size, crc32) in index['files'].items()}
         settings = {name: kind.from_values(index[name]) for name, kind in SETTINGS.items()}
+        mount = index.get('T_base_sensor')
+        T_base_sensor = None if mount is None else np.array(mount, np.float64).reshape(4, 4)
     warnings = []
     for name, file in files.items():
         try:
@@ -193,7 +203,7 @@ def read_map(folder: str | Path) -> dict[str, Any]:
             kept.put(Keyframe(node, nodes[node].stamp_ns, track_id, files[_name(node)],
                               descriptor, frame if frame.any() else None))
     return {'nodes': nodes, 'edges': edges, 'keyframes': kept, 'warnings': tuple(warnings),
-            **settings}
+            'T_base_sensor': T_base_sensor, **settings}
 
 
 def _name(node: int) -> str:
@@ -220,6 +230,8 @@ def _write_index(place: Path, known: Map) -> None:
         'format': FORMAT, 'version': VERSION, 'nodes': len(known.nodes),
         'keyframes': len(known.keyframes), 'sessions': len(known.sessions),
         **{name: asdict(getattr(known, name)) for name in SETTINGS},
+        'T_base_sensor': (None if known.T_base_sensor is None
+                          else known.T_base_sensor.tolist()),
         'files': {str(path.relative_to(place)): (path.stat().st_size,
                                                  zlib.crc32(path.read_bytes()))
                   for path in sorted(place.rglob('*')) if path.is_file()}}
@@ -236,9 +248,9 @@ def _read_index(folder: Path) -> dict[str, Any]:
         index = json.loads(path.read_text())
     if not isinstance(index, dict) or index.get('format') != FORMAT:
         raise InputError(f'{path}: not the index of a map')
-    if index.get('version') != VERSION:
+    if index.get('version') not in READABLE:
         raise InputError(f'{path}: a map of version {index.get("version")!r}; this program reads '
-                         f'version {VERSION}')
+                         f'version {READABLE[0]} to {READABLE[-1]}')
     if index.pop('crc32', None) != _checksum(index):
         raise InputError(f'{path}: damaged: its checksum does not fit')
     return index

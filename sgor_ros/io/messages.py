@@ -147,6 +147,13 @@ def path(types: Types, stamps_ns: Iterable[int], poses: Iterable[NDArray[np.floa
         for of, T in zip(stamps_ns, poses, strict=True)])
 
 
+def pose_array(types: Types, poses: Iterable[NDArray[np.float64]], stamp_ns: int, frame: str
+               ) -> Any:
+    """Return a geometry_msgs/msg/PoseArray of (4, 4) poses."""
+    return types('geometry_msgs/msg/PoseArray')(
+        header=header(types, stamp_ns, frame), poses=[pose(types, T) for T in poses])
+
+
 def odometry_of(types: Types, T: NDArray[np.float64], stamp_ns: int, frame: str,
                 child_frame: str, covariance: NDArray[np.float64] | None = None,
                 twist: NDArray[np.float64] | None = None,

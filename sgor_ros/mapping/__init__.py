@@ -4,7 +4,8 @@
 `keyframe` (what is kept of a scan), `retrieval` (which look alike), `candidates` (which pairs to
 try and when), `verification` (they are registered), `loop_consistency` (which loops to believe, by
 `paths`: the surest way between two nodes), `pose_graph` (GTSAM), `edge` and `result` (what goes in
-and out). `map_cloud` (the map as one cloud). `maps` (maps that stay).
+and out). `map_cloud` (the map as one cloud). `maps` (maps that stay), `relocalisation` (where in
+one of them the sensor is, while it is lost).
 """
 from .config import MapperConfig
 from .mapper import Mapper

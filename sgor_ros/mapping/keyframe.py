@@ -3,6 +3,7 @@ from collections.abc import Callable
 from collections.abc import Iterable
 from collections.abc import Iterator
 from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -111,7 +112,10 @@ class Keyframes:
 
     def restored(self, node: int) -> PreparedScan:
         """Return the scan of a keyframe as `register` takes it."""
-        prepared = self._restored.pop(node, None) or self._kept[node].scan.restored()
+        prepared = self._restored.pop(node, None)
+        if prepared is None:
+            kept = self._kept[node]
+            prepared = replace(kept.scan.restored(), frame_covariance=kept.frame_covariance)
         self._restored[node] = prepared    # the last that was asked for is the last to go
         while len(self._restored) > RESTORED:
             del self._restored[next(iter(self._restored))]

@@ -1,14 +1,15 @@
 """The way of a scan through the mapper, on one screen."""
 from concurrent.futures import Executor
 from dataclasses import fields
-from dataclasses import replace
 from itertools import combinations
 import math
 
 import numpy as np
+from numpy.typing import ArrayLike
 from numpy.typing import NDArray
 
 from ..core.common import se3
+from ..core.common.settings import InputError
 from ..core.config import SgorConfig
 from ..core.prepared_scan import PreparedScan
 from ..core.preprocessing import preprocess
@@ -30,6 +31,7 @@ from .maps.map import MapNode
 from .odometry import Node
 from .odometry import Odometry
 from .pose_graph import PoseGraph
+from .relocalisation import Relocalisation
 from .result import Loop
 from .result import MappedScan
 from .result import Trajectory
@@ -73,18 +75,35 @@ class Mapper:
         Those of them whose scans are kept.
     consistency : LoopConsistency
     candidates : Candidates
+    T_base_sensor : (4, 4) array or None
+        As of `Map`; for who knows it to set.
     """
 
     def __init__(self, config: SgorConfig | None = None,
                  tracker_config: TrackerConfig | None = None,
                  mapper_config: MapperConfig | None = None, *,
                  executor: Executor | None = None, map: Map | None = None) -> None:
-        known = Map() if map is None else map
         if map is not None:
             config, tracker_config, mapper_config = map.settings(config, tracker_config,
                                                                  mapper_config)
         self.tracker = Tracker(config, tracker_config)
         self.mapper_config = MapperConfig.given(mapper_config)
+        self._executor = executor
+        self._begin_in(Map() if map is None else map)
+
+    def begin_in(self, known: Map) -> None:
+        """Go on in another map, lost at first; what was mapped until now is dropped.
+
+        Raises
+        ------
+        InputError
+            It was made with a configuration that does not go with this one.
+        """
+        known.settings(self.tracker.config, None, None)
+        self.tracker.reset()
+        self._begin_in(known)
+
+    def _begin_in(self, known: Map) -> None:
         self.graph = PoseGraph()
         self.graph.add_map({node.id: node.T_map_sensor for node in known.nodes.values()},
                            known.edges)
@@ -92,12 +111,15 @@ class Mapper:
         self.consistency = LoopConsistency()
         self.consistency.begin_anew(known.edges)
         self.candidates = Candidates()
+        self.T_base_sensor = known.T_base_sensor
         self._known = known
+        self._relocalisation = Relocalisation(known)
+        self._frozen: Map | None = None
         self._found: list[Edge] = []    # loops to it that are told of with this scan
         self._odometry = Odometry(
             Node(node.id, node.stamp_ns, FROM_A_MAP, node.T_map_sensor, None, -math.inf)
             for node in known.nodes.values())
-        self._verification = Verification(executor)
+        self._verification = Verification(self._executor)
         self._closes_loops = bool(self.mapper_config.registrations_per_scan
                                   and not self.graph.missing)
         self._notes = [self.graph.missing] if self.graph.missing else []
@@ -116,6 +138,8 @@ class Mapper:
             self.tracker.begin_track()
             self._notes.append('the sensor is at another place of the map: a new track begins')
         self._keep_deskewed()
+        if self._relocalisation.hint_is_new:
+            self._look_again()
         keyframe = self.tracker.reference if tracked.keyframe else None
         return self.add(tracked, None if keyframe is None else keyframe.prepared)
 
@@ -132,9 +156,51 @@ class Mapper:
         self._found = []
         notes, self._notes = self._notes, []
         told = {item.name: getattr(tracked, item.name) for item in fields(tracked)}
+        hypotheses: tuple[Array, ...] = ()
+        T_map_odom = self._T_map_odom(tracked)
+        if T_map_odom is not None:
+            self._relocalisation.forget_hint()
+        elif tracked.T_odom_sensor is not None:
+            hypotheses = self._relocalisation.hypotheses(tracked.track_id, tracked.T_odom_sensor)
         return MappedScan(**{**told, 'warnings': (*tracked.warnings, *notes)},
                           loops=tuple(self._loop_of(edge) for edge in loops),
-                          T_map_odom=self._T_map_odom(tracked))
+                          T_map_odom=T_map_odom, hypotheses=hypotheses)
+
+    def hint(self, T_map_sensor: ArrayLike) -> None:
+        """Look for the sensor near a pose, (4, 4), first, as long as it is lost.
+
+        It may be wrong: where nothing there registers, all of the map is looked through.
+
+        Raises
+        ------
+        InputError
+            It is no pose.
+        """
+        self._relocalisation.give_hint(T_map_sensor)
+
+    def freeze(self, frozen: bool = True) -> None:
+        """Follow the map as it is from now on and add nothing to it, or add again.
+
+        Until then, `map` is what it is now.
+
+        Raises
+        ------
+        InputError
+            There are no keyframes to follow.
+        """
+        if frozen and not len(self.map.keyframes):
+            raise InputError('there is no map to follow: it has no keyframes')
+        self._frozen = self.map if frozen else None
+
+    @property
+    def begun_in_map(self) -> bool:
+        """Whether there was a map before, in whose frame poses are."""
+        return bool(self._known.nodes)
+
+    @property
+    def frozen(self) -> bool:
+        """Whether nothing is added to the map."""
+        return self._frozen is not None
 
     @property
     def map(self) -> Map:
@@ -142,6 +208,8 @@ class Mapper:
 
         Nodes of other parts, which nothing joins to it yet, are left out.
         """
+        if self._frozen is not None:
+            return self._frozen
         known = self._known
         chosen = self.graph.largest_part(next(iter(known.nodes), None))
         session = max(known.sessions, default=-1) + 1
@@ -151,7 +219,7 @@ class Mapper:
              for node, T in chosen.items()},
             tuple(edge for edge in self.graph.edges if edge.source in chosen),
             self.keyframes.copy(chosen), self.tracker.config, self.tracker.tracker_config,
-            self.mapper_config)
+            self.mapper_config, self.T_base_sensor)
 
     def finish(self) -> tuple[Loop, ...]:
         """Work on all candidates that wait, however long it takes; return the loops closed."""
@@ -203,27 +271,33 @@ class Mapper:
         if not self._closes_loops:
             return
         if not self._is_in_map(node.id):
-            self._look_for(node.id, prepared)
+            self._look_for(node, prepared)
         place = Surroundings(node, prepared, self.keyframes, self.graph, self.consistency.paths, c)
         targets = place.candidates(self._odometry.nodes)
         if not self._is_in_map(node.id):    # all of the map was asked already
             targets = [target for target in targets if target not in self._known.nodes]
         self.candidates.add(node.id, prepared, targets, c.waiting)
-        if not place.is_covered():
+        if not self.frozen and not place.is_covered():
             self.keyframes.add(node.id, node.stamp_ns, node.track_id, prepared)
 
-    def _look_for(self, node: int, prepared: PreparedScan) -> None:
+    def _look_for(self, node: Node, prepared: PreparedScan) -> None:
         """Look for a node all over the map that was there before.
 
         Where several places of it fit, one loop to each waits for what the next nodes say.
         """
-        found = self._known.locate(prepared)
-        places = {found.keyframe, *(place.keyframe for place in found.alternatives)}
-        edges = [replace(edge, source=node) for edge in found.edges
-                 if found.success or edge.target in places]
+        edges, found = self._relocalisation.look_for(node, prepared)
         self._found += self._offer(edges)
-        if not self._is_in_map(node):
+        if not self._is_in_map(node.id):
             self._notes.append(f'not found in the map: {found.reason}')
+
+    def _look_again(self) -> None:
+        """Look for the last node, now that there is a hint: the sensor may stand still."""
+        reference = self.tracker.reference
+        node = None if reference is None else self._odometry.nodes.get(
+            reference.id + self._odometry.first)
+        if (self._closes_loops and reference is not None and node is not None
+                and not self._is_in_map(node.id)):
+            self._look_for(node, reference.prepared)
 
     def _keep_deskewed(self) -> None:
         """Keep a keyframe anew whose motion was known only when the next scan came."""
@@ -242,16 +316,26 @@ class Mapper:
         count = self.mapper_config.registrations_per_scan
         if not self._closes_loops or not len(self.keyframes):
             return False
+        # how it is bent is in both registrations alike, and no reason for them to differ
         prepared = preprocess(scan, self.tracker.config)
-        alike = list(self.keyframes.alike(prepared))[:count]
-        found = [Edge(target, NO_NODE, *seen, Kind.LOOP) for target in alike if (
-            seen := self._verification.one(Candidate(NO_NODE, prepared, target), self.keyframes,
-                                           self.tracker.config)) is not None]
+        alike = list(dict.fromkeys([*self._hinted()[:count],
+                                    *list(self.keyframes.alike(prepared))[:count]]))
+        tried = [self._verification.one(Candidate(NO_NODE, prepared, target), self.keyframes,
+                                        self.tracker.config) for target in alike]
+        found = [edge for edge in tried if edge is not None]
         if not any(self.consistency.agree(*pair) for pair in combinations(found, 2)):
             return False
         at = self.graph.pose(found[0].target) @ found[0].T_target_source
         way = at[:3, 3] - self._odometry.last_pose(self.graph)[:3, 3]
         return float(np.linalg.norm(way)) > self.mapper_config.loop_radius * prepared.scale
+
+    def _hinted(self) -> list[int]:
+        """Return the keyframes, nearest to the hint first; none without a hint."""
+        hint, nodes = self._relocalisation.hint, [one.id for one in self.keyframes]
+        if hint is None:
+            return []
+        distance = np.linalg.norm((self.graph.poses(nodes) - hint)[:, :3, 3], axis=1)
+        return [nodes[row] for row in np.argsort(distance)]
 
     def _work(self, *, at_once: bool = False, wait: bool = False) -> list[Edge]:
         """Register candidates, as many as there is time for; return the loops believed now."""

@@ -44,10 +44,14 @@ class MappedScan(TrackedScan):
         Where the frame of the track lies in the map, by all loops so far: ``T_map_odom @
         T_odom_sensor`` is the corrected pose. It jumps where a loop is closed. None without a
         pose, and with a map that was there before as long as the sensor is not found in it.
+    hypotheses : tuple of (4, 4) float64
+        T_map_sensor at each place of that map that fits, as long as there are several: what is
+        driven next decides. None where it is found.
     """
 
     loops: tuple[Loop, ...] = ()
     T_map_odom: Array | None = None
+    hypotheses: tuple[Array, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,5 +1,4 @@
 """Registers candidates: at once, or in another process, so that no scan waits for it."""
-from collections.abc import Iterable
 from concurrent.futures import BrokenExecutor
 from concurrent.futures import Executor
 from concurrent.futures import Future
@@ -80,8 +79,9 @@ class Verification:
             Whether to wait for those elsewhere.
         """
         if self._executor is None or at_once:
-            return _edges(((candidate, self.one(candidate, keyframes, config))
-                           for candidate in candidates.take(count)), keyframes)
+            edges = [self.one(candidate, keyframes, config)
+                     for candidate in candidates.take(count)]
+            return [edge for edge in edges if edge is not None]
         try:
             for candidate in candidates.take(count - len(self._at_work)):
                 self._at_work.append((candidate, self._executor.submit(
@@ -89,20 +89,24 @@ class Verification:
                     keyframes[candidate.target].scan, config.replace(threads=1))))
             done = [one for one in self._at_work if wait or one[1].done()]
             self._at_work = [one for one in self._at_work if one not in done]
-            return _edges(((candidate, future.result()) for candidate, future in done), keyframes)
+            edges = [_edge(candidate, keyframes, future.result()) for candidate, future in done]
+            return [edge for edge in edges if edge is not None]
         except BrokenExecutor as error:
             self.fault = f'loops are not closed any more: {error}'
             self._executor, self._at_work = None, []
             return []
 
-    def one(self, candidate: Candidate, keyframes: Keyframes, config: SgorConfig) -> Found:
-        """Register a candidate here and now."""
-        return verify(candidate.prepared, keyframes.restored(candidate.target), config)
+    def one(self, candidate: Candidate, keyframes: Keyframes, config: SgorConfig) -> Edge | None:
+        """Register a candidate here and now; return the loop that it is, or None."""
+        return _edge(candidate, keyframes, verify(
+            candidate.prepared, keyframes.restored(candidate.target), config))
 
 
-def _edges(pairs: Iterable[tuple[Candidate, Found]], keyframes: Keyframes) -> list[Edge]:
-    return [Edge(candidate.target, candidate.source, T, with_frames(
-                covariance, T, candidate.prepared.frame_covariance,
-                keyframes[candidate.target].frame_covariance), Kind.LOOP)
-            for candidate, found in pairs if found is not None
-            for T, covariance in (found,)]
+def _edge(candidate: Candidate, keyframes: Keyframes, found: Found) -> Edge | None:
+    """Return the loop that was found, with what is not known of the frames of both scans."""
+    if found is None:
+        return None
+    T, covariance = found
+    return Edge(candidate.target, candidate.source, T, with_frames(
+        covariance, T, candidate.prepared.frame_covariance,
+        keyframes[candidate.target].frame_covariance), Kind.LOOP)

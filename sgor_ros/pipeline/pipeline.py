@@ -11,12 +11,14 @@ from numpy.typing import NDArray
 
 from ..core.common import se3
 from ..core.common.settings import InputError
+from ..core.scan.deskewing import deskewed
 from ..core.scan.scan import SemanticScan
 from ..io import messages
 from ..io.frames import frame_id
 from ..io.frames import OdomFrame
 from ..io.sequence import StampedScan
 from ..io.stream_config import StreamConfig
+from ..mapping import Map
 from ..mapping import MappedScan
 from ..mapping import Mapper
 from ..mapping.map_cloud import map_cloud
@@ -25,7 +27,9 @@ from ..tracker import Tracker
 from .extrinsic import Extrinsic
 from .extrinsic import mounted
 from .outcome import Outcome
+from .query import Query
 from .sinks import CORRESPONDENCES
+from .sinks import HYPOTHESES
 from .sinks import LOOP_CLOSURE
 from .sinks import MAP_CLOUD
 from .sinks import MessageSink
@@ -80,10 +84,49 @@ class Pipeline:
         self._keyframe_frames: dict[int, str] = {}
         self._placed: TrackedScan | None = None
         self._mount: tuple[str, int, NDArray[np.float64]] | None = None    # frame, stamp, pose
+        self._hint: NDArray[np.float64] | None = None
+        self._told_hypotheses = False
+        if self.mapper is not None:
+            self._odom_frame.T_map_mapper = self.mapper.T_base_sensor
 
     def begin_at(self, T_odom_child: NDArray[np.float64], covariance: NDArray[np.float64]) -> None:
         """Let the next track begin at a pose, (4, 4) with (6, 6), of the frame it publishes."""
         self._odom_frame.begin_at(T_odom_child, covariance)
+
+    def begin_in(self, known: Map) -> None:
+        """Let the mapper go on in another map; odom goes on.
+
+        Raises
+        ------
+        InputError
+            Its settings do not go with those of the mapper.
+        """
+        assert self.mapper is not None, 'a mapper has a map'
+        self.mapper.begin_in(known)
+        self._odom_frame.T_map_mapper = known.T_base_sensor
+
+    def hint(self, T_map_child: NDArray[np.float64]) -> None:
+        """Look for what is published near a pose of the map, (4, 4), while it is lost there."""
+        self._hint = T_map_child
+
+    def query(self, outcome: Outcome) -> Query:
+        """Return the scan of an outcome, to be found in the map.
+
+        Raises
+        ------
+        InputError
+            It could not be read, or nobody knows its mount.
+        """
+        if outcome.scan is None:
+            raise InputError(outcome.reason)
+        mount = self._T_child_sensor(outcome.stamp_ns, outcome.frame)
+        if isinstance(mount, str):
+            raise InputError(mount)
+        scan = self._mounted(outcome.scan, outcome.stamp_ns, outcome.frame)
+        if outcome.tracked is not None and outcome.tracked.twist is not None:
+            scan = deskewed(scan, outcome.tracked.twist)
+        return Query(scan, outcome.stamp_ns, self._config.base_frame or outcome.frame,
+                     self._T_map_mapper(mount), mount)
 
     def process(self, scan: StampedScan) -> Outcome:
         """Take the next scan and write its messages; an unusable one is an outcome, too."""
@@ -144,7 +187,26 @@ class Pipeline:
             self._mount = frame, stamp_ns, found
         return found
 
+    def _T_child_sensor(self, stamp_ns: int, frame: str) -> NDArray[np.float64] | str:
+        """Return the pose of the sensor in the frame that is published, or why there is none."""
+        return np.eye(4) if self._extrinsic is None else self._T_base_sensor(stamp_ns, frame)
+
+    def _T_map_mapper(self, T_child_sensor: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return where the mapper's frame lies in the map; one without a mount takes today's."""
+        T = self._odom_frame.T_map_mapper
+        return T_child_sensor if T is None else T
+
+    def _give_hint(self, stamp_ns: int, frame: str) -> None:
+        """Hand the hint on to the mapper, as a pose of the sensor in its frame."""
+        if self._hint is None or self.mapper is None:
+            return
+        mount = self._T_child_sensor(stamp_ns, frame)
+        if not isinstance(mount, str):
+            self.mapper.hint(se3.inverse(self._T_map_mapper(mount)) @ self._hint @ mount)
+            self._hint = None
+
     def _track(self, scan: SemanticScan, stamp_ns: int, frame: str) -> TrackedScan:
+        self._give_hint(stamp_ns, frame)
         tracked = (self.mapper or self.tracker).track(scan, stamp_ns)
         before, self._frame = self._frame, frame
         if before in ('', frame) or tracked.restarted:
@@ -161,6 +223,11 @@ class Pipeline:
             if isinstance(found, str):
                 return found
             T_base_sensor = found
+            if self.mapper is not None and self.mapper.T_base_sensor is None:
+                self.mapper.T_base_sensor = found
+        if self.mapper is not None and self.mapper.begun_in_map and tracked.success:
+            mount = np.eye(4) if T_base_sensor is None else T_base_sensor
+            self._odom_frame.T_map_mapper = self._T_map_mapper(mount)
         if self.mapper is not None and tracked.restarted and self._placed is not None:
             # odom never jumps where there is a map: the map does (REP-105)
             self._odom_frame.go_on_at(*self._predicted(self._placed, tracked.stamp_ns))
@@ -212,6 +279,11 @@ class Pipeline:
         assert self.mapper is not None
         for loop in mapped.loops:
             yield LOOP_CLOSURE, messages.loop_closure(sink.types, loop, frame)
+        if mapped.hypotheses or self._told_hypotheses:
+            yield HYPOTHESES, messages.pose_array(
+                sink.types, self._hypotheses(mapped, frame), mapped.stamp_ns,
+                self._config.map_frame)
+            self._told_hypotheses = bool(mapped.hypotheses)    # none once, where it is found
         if mapped.T_map_odom is None or not self._odom_frame.knows(mapped.track_id):
             return
         T_map_odom = self._odom_frame.map_to_odom(mapped.track_id, mapped.T_map_odom)
@@ -227,6 +299,12 @@ class Pipeline:
         if mapped.keyframe and sink.wants(MAP_CLOUD):
             yield MAP_CLOUD, messages.point_cloud2(
                 sink.types, *self._map_cloud(), mapped.stamp_ns, of_map)
+
+    def _hypotheses(self, mapped: MappedScan, frame: str) -> list[NDArray[np.float64]]:
+        """Return where in the map what is published may be; nothing while the mount is unknown."""
+        mount = self._T_child_sensor(mapped.stamp_ns, frame)
+        return [] if isinstance(mount, str) else [
+            self._T_map_mapper(mount) @ T @ se3.inverse(mount) for T in mapped.hypotheses]
 
     def _map_cloud(self) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
         assert self.mapper is not None

@@ -7,7 +7,7 @@ from ..io.bags import BagWriter
 
 ODOMETRY, POSE, RELATIVE_POSE, CORRESPONDENCES = (
     'odometry', 'pose', 'relative_pose', 'correspondences')
-LOOP_CLOSURE, PATH, MAP_CLOUD = 'loop_closure', 'path', 'map_cloud'
+LOOP_CLOSURE, PATH, MAP_CLOUD, HYPOTHESES = 'loop_closure', 'path', 'map_cloud', 'hypotheses'
 """Of the mapper alone."""
 TF = '/tf'
 

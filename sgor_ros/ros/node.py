@@ -29,6 +29,7 @@ from .input.stamp_gaps import StampGaps
 from .input.stream import CloudStream
 from .input.subscription import CloudSubscription
 from .input.subscription import override_names
+from .map_services import MapServices
 from .output.publishers import refuse_unknown_overrides
 from .output.sink import TopicSink
 from .output.tf2_extrinsic import tf2_extrinsic
@@ -58,7 +59,9 @@ class SgorNode(Node):
         self._loops: ProcessPoolExecutor | None = None
         self._pipeline = self._pipeline_of(self._config)
         self._at_work = threading.Lock()    # held while a scan changes the map
-        self._requests = Services(self, self._config.odom_frame, self._save_map)
+        self._requests = Services(self, self._config.odom_frame)
+        self._map = MapServices(self, self._pipeline, self._at_work,
+                                lambda: self._settings.map_folder, self._config.map_frame)
         self._stream = CloudStream(self.resolve_topic_name('points'), self._config.label_field,
                                    self._config.time_field)
         self._gaps = StampGaps()
@@ -89,8 +92,11 @@ class SgorNode(Node):
         if config.map_folder and Path(config.map_folder).exists():
             known = Map.load(config.map_folder)
             self.get_logger().info(f'{config.map_folder}: {known}, to be found in')
-        return Mapper(*self._settings.live, self._settings.mapper_config, executor=self._loops,
-                      map=known)
+        mapper = Mapper(*self._settings.live, self._settings.mapper_config, executor=self._loops,
+                        map=known)
+        if config.localization:
+            mapper.freeze()
+        return mapper
 
     def start(self) -> None:
         """Begin to work; clouds are subscribed to once everything is compiled."""
@@ -102,6 +108,7 @@ class SgorNode(Node):
         One that compiles is not waited for: that may take minutes.
         """
         self._stream.close()
+        self._map.close()
         if self._worker.is_alive():
             self._worker.join(GRACE_S if self._compiled else 0.0)
         if self._loops is not None:
@@ -166,6 +173,7 @@ class SgorNode(Node):
         self._apply_requests()
         with self._at_work:
             outcome = self._pipeline.process(scan)
+        self._map.heard(outcome)
         if not outcome.frame:
             self._log.warn_once('the clouds have no frame_id: set the parameter sensor_frame')
         if outcome.T_odom_child is not None and not self._placed:
@@ -190,22 +198,6 @@ class SgorNode(Node):
             'seconds': f'{now - self._began_at:.4f}',
             'latency': f'{now - scan.arrived_ns * 1e-9:.4f}'})
 
-    def _save_map(self) -> str:
-        """Save the map as it is after the last scan; return what was saved, in words.
-
-        Raises
-        ------
-        InputError
-            There is no map, or nowhere to save it.
-        """
-        mapper, folder = self._pipeline.mapper, self._config.map_folder
-        if mapper is None or not folder:
-            raise InputError('the parameters loop_closure and map_folder are needed')
-        with self._at_work:
-            known = mapper.map
-        known.save(folder)
-        return f'{folder}: {known}'
-
     def _apply_requests(self) -> None:
         """Take over the parameters and what the services were asked for since the last scan."""
         tracker = self._pipeline.tracker
@@ -213,5 +205,7 @@ class SgorNode(Node):
         reset, start = self._requests.take()
         if start is not None:
             self._pipeline.begin_at(*start)
+        if (hint := self._map.take_hint()) is not None:
+            self._pipeline.hint(hint)
         if reset:
             tracker.reset()

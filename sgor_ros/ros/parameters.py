@@ -32,11 +32,13 @@ from ..mapping import MapperConfig
 from ..tracker import TrackerConfig
 
 LARGEST_INTEGER = 2**31 - 1
+MAP_FOLDER = 'map_folder'
+"""What of `NodeConfig` can be changed while the node runs."""
 
 
 @dataclass(frozen=True)
 class NodeConfig(StreamConfig):
-    """What concerns the node's connections; fixed while it runs."""
+    """What concerns the node's connections; fixed while it runs, but for `map_folder`."""
 
     reliability: str = setting(
         'auto', 'QoS of the subscription; auto: reliable, which loses no large clouds, until a '
@@ -45,9 +47,12 @@ class NodeConfig(StreamConfig):
         False, 'Close loops: publish loop_closure, path and map_cloud, and with publish_tf the '
         'transform from map_frame to odom_frame; needs GTSAM')
     map_folder: str = setting(
-        '', 'Where the service save_map writes the map; one that is there when the node starts is '
-        'gone on in: the sensor is looked for in it, and map_frame is its frame. Needs '
-        'loop_closure')
+        '', 'Folder of the map, for the services save_map and load_map; it can be changed while '
+        'the node runs. A map that is there when the node starts is gone on in: the sensor is '
+        'looked for in it, and map_frame is its frame. Needs loop_closure')
+    localization: bool = setting(
+        False, 'Follow the map of map_folder and add nothing to it, until the service '
+        'set_mode_mapping is called')
     publish_tf: bool = setting(
         False, 'Publish the transform from odom_frame to base_frame, or to the sensor frame, on '
         '/tf')
@@ -64,11 +69,14 @@ class NodeParameters:
     mapper_config : MapperConfig
     live : (SgorConfig, TrackerConfig)
         The newest; replaced as a whole, so any thread may read it.
+    map_folder : str
+        The newest.
     """
 
     def __init__(self, node: Node) -> None:
         self._node = node
         self.node_config = NodeConfig.from_values(_declare(node, NodeConfig, read_only=True))
+        self.map_folder = self.node_config.map_folder
         self.mapper_config = MapperConfig.from_values(_declare(node, MapperConfig, read_only=True))
         self.live = (SgorConfig.from_values(_declare(node, SgorConfig)),
                      TrackerConfig.from_values(_declare(node, TrackerConfig)))
@@ -88,6 +96,9 @@ class NodeParameters:
     def _apply(self, parameters: list[Parameter]) -> None:
         before = self.live
         self.live = self._changed(parameters)
+        for item in parameters:
+            if item.name == MAP_FOLDER:
+                self.map_folder = item.value
         if self.live != before:
             changes = ', '.join(f'{item.name} = {item.value}' for item in parameters)
             self._node.get_logger().info(f'from the next scan on: {changes}')
@@ -119,7 +130,7 @@ def _declare(node: Node, config: type[Settings], read_only: bool = False) -> dic
     try:
         return {item.name: node.declare_parameter(
             item.name, given[before[item.name]].value if item.name in before else item.default,
-            _descriptor(item, read_only)).value for item in items}
+            _descriptor(item, read_only and item.name != MAP_FOLDER)).value for item in items}
     except InvalidParameterTypeException as error:
         raise InputError(f'{error} (a double needs its point: 3.0, not 3)') from error
     except ParameterException as error:

@@ -1,5 +1,4 @@
-"""What others may ask: the services reset, pause, resume and save_map, the topic set_pose."""
-from collections.abc import Callable
+"""What others may ask of the track: the services reset, pause, resume, the topic set_pose."""
 import threading
 
 from geometry_msgs.msg import PoseWithCovarianceStamped
@@ -10,7 +9,6 @@ from scipy.spatial.transform import Rotation
 from std_srvs.srv import Trigger
 
 from ..core.common import se3
-from ..core.common.settings import InputError
 from ..io.frames import frame_id
 
 Array = NDArray[np.float64]
@@ -30,7 +28,7 @@ class Services:
     paused : bool
     """
 
-    def __init__(self, node: Node, odom_frame: str, save_map: Callable[[], str]) -> None:
+    def __init__(self, node: Node, odom_frame: str) -> None:
         self._log = node.get_logger()
         self._odom_frame = odom_frame
         self._lock = threading.Lock()
@@ -40,8 +38,6 @@ class Services:
         node.create_service(Trigger, 'reset', self._on_reset)
         node.create_service(Trigger, 'pause', self._on_pause)
         node.create_service(Trigger, 'resume', self._on_resume)
-        self._save_map = save_map
-        node.create_service(Trigger, 'save_map', self._on_save_map)
         node.create_subscription(PoseWithCovarianceStamped, 'set_pose', self._on_set_pose, 1)
 
     def take(self) -> tuple[bool, tuple[Array, Array] | None]:
@@ -71,13 +67,6 @@ class Services:
     def _on_resume(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         self.paused = False
         return _done(response, 'the next scan goes on from the last one before the pause')
-
-    def _on_save_map(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        try:
-            return _done(response, self._save_map())
-        except (InputError, OSError) as error:
-            response.success, response.message = False, str(error)
-            return response
 
     def _on_set_pose(self, message: PoseWithCovarianceStamped) -> None:
         """Begin a new track there with the next scan."""

@@ -122,7 +122,8 @@ def test_only_the_pipeline_decodes_places_and_makes_messages(path):
 
 def test_the_rooms_of_the_node_do_not_know_the_node():
     """The process, the node and its services lie on input, output and diagnostics."""
-    above = tuple(f'sgor_ros.ros.{name}.' for name in ('main', 'node', 'services'))
+    above = tuple(f'sgor_ros.ros.{name}.' for name in ('main', 'node', 'services',
+                                                         'map_services'))
     rooms = [path for path in SOURCES if path.is_relative_to(PACKAGE / 'ros')
              and path.parent != PACKAGE / 'ros']
     assert len(rooms) > 10
@@ -131,7 +132,8 @@ def test_the_rooms_of_the_node_do_not_know_the_node():
 
 
 MAPPING = ('config', 'edge', 'result', 'retrieval', 'paths', 'pose_graph', 'odometry', 'keyframe',
-           'map_cloud', 'loop_consistency', 'candidates', 'verification', 'maps', 'mapper')
+           'map_cloud', 'loop_consistency', 'candidates', 'verification', 'maps',
+           'relocalisation', 'mapper')
 
 
 def test_the_files_of_mapping_lie_on_each_other():

@@ -65,6 +65,9 @@ class Map:
         What it was made with, as are the next two.
     tracker_config : TrackerConfig
     mapper_config : MapperConfig
+    T_base_sensor : (4, 4) float64 or None
+        Mount of the sensor of the first scan on its vehicle, metres; None where nobody told.
+        Exports lie in the frame of the base, whose z is up.
     warnings : tuple of str
         What is wrong with its folder and does no harm, in words.
     """
@@ -75,6 +78,7 @@ class Map:
     config: SgorConfig = field(default_factory=SgorConfig)
     tracker_config: TrackerConfig = field(default_factory=TrackerConfig)
     mapper_config: MapperConfig = field(default_factory=MapperConfig)
+    T_base_sensor: Array | None = None
     warnings: tuple[str, ...] = ()
 
     @classmethod
@@ -132,10 +136,15 @@ class Map:
         """
         return merge(self, other)
 
-    def scans(self) -> Iterator[tuple[Array, CompactScan]]:
-        """Yield T_map_sensor and scan of each keyframe, for the cloud or the grid of the map."""
+    def scans(self, *, of_base: bool = False) -> Iterator[tuple[Array, CompactScan]]:
+        """Yield T_map_sensor and scan of each keyframe, for the cloud or the grid of the map.
+
+        With `of_base` the poses are seen from the base at the first scan, where the mount is
+        known: z is up then, however the sensor is tilted.
+        """
+        frame = self.T_base_sensor if of_base and self.T_base_sensor is not None else np.eye(4)
         for keyframe in self.keyframes:
-            yield self.nodes[keyframe.id].T_map_sensor, keyframe.scan
+            yield frame @ self.nodes[keyframe.id].T_map_sensor, keyframe.scan
 
     @cached_property
     def positions(self) -> tuple[list[int], Array]:

@@ -89,6 +89,7 @@ def map_details(mapper: Mapper | None) -> dict[str, str]:
     """Return the same of the map, with what was put off; nothing where no loops are closed."""
     if mapper is None:
         return {}
-    return {'loops': str(len(mapper.graph.loops)), 'keyframes': str(len(mapper.keyframes)),
+    return {'map mode': 'localization' if mapper.frozen else 'mapping',
+            'loops': str(len(mapper.graph.loops)), 'keyframes': str(len(mapper.keyframes)),
             'loop candidates waiting': str(len(mapper.candidates)),
             'loop candidates put off': str(mapper.candidates.put_off)}

@@ -5,6 +5,7 @@ from rclpy.node import Node
 
 from ...core.common.settings import InputError
 from ...pipeline.sinks import CORRESPONDENCES
+from ...pipeline.sinks import HYPOTHESES
 from ...pipeline.sinks import LOOP_CLOSURE
 from ...pipeline.sinks import MAP_CLOUD
 from ...pipeline.sinks import ODOMETRY
@@ -28,6 +29,7 @@ MAP_TOPICS = {
     LOOP_CLOSURE: ('nav_msgs/msg/Odometry', 100),
     PATH: ('nav_msgs/msg/Path', 1),
     MAP_CLOUD: ('sensor_msgs/msg/PointCloud2', 1),
+    HYPOTHESES: ('geometry_msgs/msg/PoseArray', 10),
 }
 """The same where loops are closed."""
 EDGES = (RELATIVE_POSE, LOOP_CLOSURE)
