@@ -9,8 +9,10 @@ from return_drive import known_map
 from return_drive import mapped
 from return_drive import PERIOD_NS
 from return_drive import return_drive
+from return_drive import shifted
 from return_drive import THERE
 from return_drive import TURN
+from return_drive import twice
 
 from sgor_ros import InputError
 from sgor_ros import Map
@@ -22,7 +24,6 @@ from sgor_ros import SemanticScan
 from sgor_ros import SgorConfig
 from sgor_ros import Status
 from sgor_ros.core.common import se3
-from sgor_ros.mapping.edge import Edge
 from sgor_ros.mapping.keyframe import Keyframes
 
 pytest.importorskip('gtsam')
@@ -43,34 +44,6 @@ def truth(index, yaw=0.0):
 def scan_of(index, yaw=0.0, labels=True):
     points, its, _ = return_drive()[index]
     return SemanticScan(turned(points, yaw), its if labels else None)
-
-
-def shifted(known, T):
-    """Return a map whose frame is another."""
-    nodes = {node.id: replace(node, T_map_sensor=T @ node.T_map_sensor)
-             for node in known.nodes.values()}
-    return replace(known, nodes=nodes)
-
-
-def twice(known, T, copied=None):
-    """Return a map with a second floor at T_map_floor, on which some nodes look the same.
-
-    Stairs lead there, of which little is known.
-    """
-    offset = max(known.nodes) + 1
-    copied = list(known.nodes) if copied is None else copied
-    nodes = {**known.nodes, **{node + offset: replace(shifted(known, T).nodes[node],
-                                                      id=node + offset) for node in copied}}
-    edges = [replace(edge, target=edge.target + offset, source=edge.source + offset)
-             for edge in known.edges if {edge.target, edge.source} <= set(copied)]
-    T_node = known.nodes[copied[0]].T_map_sensor
-    stairs = Edge(copied[0], copied[0] + offset, np.linalg.inv(T_node) @ T @ T_node,
-                  np.diag([25.0] * 3 + [0.1] * 3))
-    keyframes = known.keyframes.copy()
-    for one in known.keyframes:
-        if one.id in copied:
-            keyframes.put(replace(one, id=one.id + offset))
-    return replace(known, nodes=nodes, edges=(*known.edges, *edges, stairs), keyframes=keyframes)
 
 
 @pytest.mark.parametrize('labels', [True, False])
