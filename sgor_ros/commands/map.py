@@ -13,6 +13,7 @@ from ..core.common.settings import InputError
 from ..core.config import SgorConfig
 from ..core.warmup import warm_up
 from ..evaluation.report.map_plots import plot_map
+from ..io.executors import executor
 from ..io.grid_files import write_grid
 from ..io.map_files import write_map_pcd
 from ..io.map_files import write_map_ply
@@ -101,9 +102,13 @@ def locate(arguments: Namespace) -> int:
 
 def merge(arguments: Namespace) -> int:
     """Make one map of two and write it; 1 where they share nothing."""
-    known, other = (_loaded(folder) for folder in (arguments.map, arguments.other))
+    if arguments.processes < 1:
+        raise InputError(f'--processes {arguments.processes}: expected 1 or more')
+    # workers read the scans by the same paths
+    known, other = (_loaded(folder.resolve()) for folder in (arguments.map, arguments.other))
     warm_up(known.config)
-    merged = known.merge(other)
+    with executor(arguments.processes, arguments.dask) as workers:
+        merged = known.merge(other, workers)
     if merged.map is None:
         print(f'not merged: {merged.reason}')
         return FAILED
@@ -246,6 +251,10 @@ def _parser() -> Parser:
     _add_map(one)
     one.add_argument('other', type=Path, metavar='OTHER', help='of the same place, in part')
     _add_output(one)
+    one.add_argument('--processes', type=int, default=1, metavar='INT', help='to locate keyframes '
+                     'in')
+    one.add_argument('--dask', default='', metavar='ADDRESS', help='of a scheduler, to locate '
+                     'them on its workers, which see both maps by the same paths')
     one = command(export, 'MAP OUTPUT [options]', 'maps/yard yard.yaml --resolution 0.05')
     _add_map(one)
     one.add_argument('output', type=Path, metavar='OUTPUT', help='.ply or .pcd for the cloud; '

@@ -6,19 +6,17 @@ from collections.abc import Iterable
 from collections.abc import Iterator
 from collections.abc import Sequence
 from concurrent.futures import as_completed
-from concurrent.futures import ProcessPoolExecutor
 from contextlib import nullcontext
 from dataclasses import asdict
 from dataclasses import replace
 import json
-import multiprocessing
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from tqdm import tqdm
 
 from ..core.common.settings import InputError
+from ..io.executors import executor
 from .front_end import Features
 from .job import Job
 from .methods import Method
@@ -112,35 +110,13 @@ def _by_key(rows: Iterable[Row]) -> dict[tuple[str, str, str], Row]:
 
 def _completed(jobs: Sequence[Job], processes: int, dask: str) -> Iterator[list[Row]]:
     """Yield the rows of each job, in any order."""
-    if dask:
-        yield from _by_dask(jobs, dask)
-    elif processes == 1 or len(jobs) < 2:
-        for job in jobs:
-            yield job()
-    else:
-        # threads of the parent do not survive a fork
-        context = multiprocessing.get_context('spawn')
-        with ProcessPoolExecutor(processes, context) as pool:
-            for future in as_completed([pool.submit(_call, job) for job in jobs]):
-                yield future.result()
-
-
-def _by_dask(jobs: Iterable[Job], address: str) -> Iterator[list[Row]]:
-    try:
-        from distributed import as_completed as completed
-        from distributed import Client
-    except ImportError as error:
-        raise InputError(f'--dask needs distributed ({error}): pip install distributed'
-                         ) from error
-    connect: Any = Client
-    try:
-        client = connect(address, timeout='10s')
-    except (OSError, TimeoutError, ValueError) as error:
-        raise InputError(f'--dask {address}: no scheduler there: {error}') from error
-    with client:
-        results: Any = completed
-        for _, found in results(client.map(_call, list(jobs), pure=False), with_results=True):
-            yield found
+    with executor(1 if len(jobs) < 2 else processes, dask) as workers:
+        if workers is None:
+            for job in jobs:
+                yield job()
+        else:
+            for done in as_completed([workers.submit(_call, job) for job in jobs]):
+                yield done.result()
 
 
 def _call(job: Job) -> list[Row]:

@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+import zlib
 
 import numpy as np
 import pytest
@@ -154,8 +155,30 @@ def test_damage_of_what_is_not_read_is_a_warning(copied, name, damage):
 def test_a_map_of_another_version_is_said(copied):
     index = json.loads((copied / 'map.json').read_text())
     (copied / 'map.json').write_text(json.dumps({**index, 'version': 7}))
-    with pytest.raises(InputError, match='version 7; this program reads version 1'):
+    with pytest.raises(InputError, match='version 7; this program reads version 1 to 2'):
         Map.load(copied)
+
+
+def test_a_map_of_version_1_is_read(copied):
+    """It says nothing of a mount, nor of a setting that came later."""
+    index = json.loads((copied / 'map.json').read_text())
+    del index['crc32'], index['T_base_sensor'], index['tracker_config']['retries']
+    index['version'] = 1
+    index['crc32'] = zlib.crc32(json.dumps(index, sort_keys=True).encode())
+    (copied / 'map.json').write_text(json.dumps(index))
+    loaded = Map.load(copied)
+    same(loaded, known_map())
+    assert loaded.T_base_sensor is None
+
+
+def test_the_mount_is_kept(tmp_path):
+    mount = np.eye(4)
+    mount[:3, 3] = 1 / 3, 0, 1.8
+    mounted = replace(known_map(), T_base_sensor=mount)
+    mounted.save(tmp_path / 'mounted')
+    np.testing.assert_array_equal(Map.load(tmp_path / 'mounted').T_base_sensor, mount)
+    for (T, _), (T_base, _) in zip(mounted.scans(), mounted.scans(of_base=True), strict=True):
+        np.testing.assert_array_equal(T_base, mount @ T)
 
 
 @pytest.mark.parametrize(('text', 'fault'), [

@@ -1,4 +1,6 @@
 """A mapper that goes on in a map of before: begins lost, finds itself, adds what is new."""
+from dataclasses import replace
+
 from conftest import errors
 from conftest import relative
 import numpy as np
@@ -9,6 +11,7 @@ from return_drive import PERIOD_NS
 from return_drive import return_drive
 from return_drive import THERE
 from return_drive import TURN
+from return_drive import twice
 
 from sgor_ros import InputError
 from sgor_ros import Map
@@ -110,3 +113,111 @@ def test_settings_are_those_of_the_map_or_go_with_it():
                   ).tracker.config.min_confidence == 0.7
     with pytest.raises(InputError, match=r'config: voxel_size = 0\.5, but the map'):
         Mapper(SgorConfig(voxel_size=0.5), map=known)
+
+
+def test_frozen_it_follows_the_map_and_adds_nothing_until_it_is_told():
+    """In a map of the first metres, from its end on to where it knows nothing."""
+    known = mapped(return_drive()[:THERE // 2]).map
+    mapper = Mapper(map=known)
+    mapper.freeze()
+    indexes = range(THERE // 2 - 3, THERE - 7)
+    for scan, index in zip(drive(mapper, indexes), indexes, strict=True):
+        assert error(scan, index) < 0.15
+    assert mapper.frozen
+    assert mapper.map.nodes.keys() == known.nodes.keys()
+    assert len(mapper.map.edges) == len(known.edges)
+    for node, its in mapper.map.nodes.items():
+        np.testing.assert_array_equal(its.T_map_sensor, known.nodes[node].T_map_sensor)
+    assert {one.id for one in mapper.keyframes} == {one.id for one in known.keyframes}
+    mapper.freeze(False)
+    drive(mapper, range(THERE - 7, THERE), start=100)
+    assert mapper.map.sessions == (0, 1)
+    assert len(mapper.map.keyframes) > len(known.keyframes)
+
+
+def test_what_cannot_be_followed_is_said():
+    with pytest.raises(InputError, match='no map to follow'):
+        Mapper().freeze()
+
+
+def test_it_begins_anew_in_another_map(elsewhere):
+    mapper = mapped(elsewhere)
+    mapper.begin_in(known_map())
+    tracked = drive(mapper, range(BACK, BACK + 3), start=50)
+    assert tracked[0].restarted
+    assert tracked[0].track_id == 2
+    for i, scan in enumerate(tracked):
+        assert error(scan, BACK + i) < 0.1
+    assert mapper.map.sessions == (0, 1)
+    assert len(mapper.trajectory().stamps_ns) == 3    # what was mapped before is gone
+    with pytest.raises(InputError, match='voxel_size'):
+        mapper.begin_in(mapped([], Mapper(SgorConfig(voxel_size=0.4))).map)
+    assert error(drive(mapper, [BACK + 3], start=60)[0], BACK + 3) < 0.1    # in it still
+
+
+@pytest.mark.parametrize('hinted', [BACK, 2])
+def test_a_hint_is_tried_first_and_may_be_wrong(monkeypatch, hinted):
+    hints = []
+    locate = Map.locate
+    monkeypatch.setattr(Map, 'locate', lambda self, scan, hint=None: (
+        hints.append(hint), locate(self, scan, hint))[1])
+    mapper = Mapper(map=known_map())
+    mapper.hint(truth(hinted))
+    for i, scan in enumerate(drive(mapper, range(BACK, BACK + 3))):
+        assert error(scan, BACK + i) < 0.1
+    np.testing.assert_array_equal(hints[0], truth(hinted))
+    assert len(hints) <= 2
+
+
+def test_a_hint_of_one_of_two_floors_alike_decides_nothing():
+    upstairs = np.eye(4)
+    upstairs[:3, 3] = 0, 0, 40
+    mapper = Mapper(map=twice(known_map(), upstairs))
+    mapper.hint(upstairs @ truth(BACK + 3))
+    points, labels, _ = return_drive()[BACK + 3]
+    for i in range(2):
+        seen = mapper.track(SemanticScan(points, labels), i * PERIOD_NS)
+        assert seen.T_map_odom is None
+        floors = sorted(seen.hypotheses, key=lambda T: T[2, 3])
+        assert len(floors) == 2
+        assert errors(floors[0], truth(BACK + 3))[0] < 0.15
+        assert errors(floors[1], upstairs @ truth(BACK + 3))[0] < 0.15
+
+
+def test_hypotheses_move_with_the_sensor_and_end_where_it_is_found():
+    upstairs = np.eye(4)
+    upstairs[:3, 3] = 0, 0, 40
+    known = known_map()
+    mapper = Mapper(map=twice(known, upstairs, list(known.nodes)[:2]))
+    found = False
+    for i, scan in enumerate(drive(mapper, range(THERE))):
+        found |= scan.T_map_odom is not None
+        assert not (found and scan.hypotheses)
+        if scan.hypotheses:
+            near = min(errors(T, truth(i))[0] for T in scan.hypotheses)
+            assert near < 0.2
+    assert found
+
+
+@pytest.mark.parametrize('hint', [np.zeros(3), np.full((4, 4), np.nan), np.diag([2, 1, 1, 1])])
+def test_a_hint_that_is_no_pose_is_refused(hint):
+    with pytest.raises(InputError, match='T_map_sensor'):
+        Mapper(map=known_map()).hint(hint)
+
+
+def test_carried_away_it_is_found_though_keyframes_were_bent():
+    """Two keyframes disagree by 0.4 m, and know that they may."""
+    bent = 0.4
+    known, keyframes = known_map(), known_map().keyframes.copy()
+    for i, one in enumerate(known.keyframes):
+        compact, arrays = one.scan, dict(one.scan.arrays)
+        moved = np.array([bent if i % 2 else 0.0, 0.0, 0.0])
+        for name in ('points', 'surface_points', 'origin'):
+            arrays[name] = (arrays[name] + moved).astype(arrays[name].dtype)
+        keyframes.put(replace(one, held=replace(compact, arrays=arrays),
+                              frame_covariance=np.diag([bent**2] * 3 + [1e-6] * 3)))
+    mapper = Mapper(map=replace(known, keyframes=keyframes))
+    indexes = [*range(3), THERE - 2, THERE - 1]
+    told = drive(mapper, indexes)
+    assert any('another place of the map' in text for text in told[3].warnings)
+    assert error(told[4], THERE - 1) < 2 * bent

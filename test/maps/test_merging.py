@@ -15,6 +15,7 @@ from return_drive import TURN
 from sgor_ros import InputError
 from sgor_ros import Map
 from sgor_ros import SgorConfig
+from sgor_ros.io.executors import executor
 from sgor_ros.mapping.edge import Kind
 
 pytest.importorskip('gtsam')
@@ -98,3 +99,51 @@ def test_maps_of_other_settings_are_refused(back):
     other = replace(back, config=SgorConfig(voxel_size=0.4))
     with pytest.raises(InputError, match=r'other: voxel_size = 0\.4, but this map'):
         known_map().merge(other)
+
+
+def test_what_is_not_known_of_the_frames_is_in_the_loops(back, merged):
+    """Of either map; a turn of the sensor has to be in it."""
+    def unsure(known, covariance):
+        keyframes = known.keyframes.copy()
+        for one in known.keyframes:
+            keyframes.put(replace(one, frame_covariance=covariance))
+        return replace(known, keyframes=keyframes)
+
+    of_other, of_known = np.diag([0.04, 0.01, 0, 0, 0, 0]), np.diag([0, 0, 0.09, 0, 0, 0])
+    again = unsure(known_map(), of_known).merge(unsure(back, of_other))
+    before = {(loop.target, loop.source): loop for loop in merged.loops}
+    common = [loop for loop in again.loops if (loop.target, loop.source) in before]
+    assert common
+    for loop in common:
+        more = loop.covariance - before[loop.target, loop.source].covariance
+        R = loop.T_target_source[:3, :3]
+        np.testing.assert_allclose(more[:3, :3], R @ of_other[:3, :3] @ R.T + of_known[:3, :3],
+                                   atol=1e-9)
+
+
+def test_over_processes_and_on_a_cluster_it_becomes_the_same_graph(back, merged, tmp_path,
+                                                                  monkeypatch):
+    """Of maps in memory and of maps in folders, three keyframes a task."""
+    from distributed import LocalCluster
+    monkeypatch.setattr('sgor_ros.mapping.maps.merging.TOGETHER', 3)
+    known_map().save(tmp_path / 'there')
+    back.save(tmp_path / 'back')
+    with executor(2) as workers:
+        assert_same(known_map().merge(back, workers), merged)
+    with (LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
+          executor(dask=cluster.scheduler_address) as workers):
+        assert_same(Map.load(tmp_path / 'there').merge(Map.load(tmp_path / 'back'), workers),
+                    merged)
+
+
+def assert_same(one, other):
+    """Assert that two merged maps are the same, bit by bit."""
+    assert (one.success, one.reason, one.found) == (other.success, other.reason, other.found)
+    assert list(one.map.nodes) == list(other.map.nodes)
+    for node, its in other.map.nodes.items():
+        np.testing.assert_array_equal(one.map.nodes[node].T_map_sensor, its.T_map_sensor)
+    for edge, its in zip(one.map.edges, other.map.edges, strict=True):
+        assert (edge.target, edge.source, edge.kind) == (its.target, its.source, its.kind)
+        np.testing.assert_array_equal(edge.T_target_source, its.T_target_source)
+        np.testing.assert_array_equal(edge.covariance, its.covariance)
+    assert [one.id for one in one.map.keyframes] == [one.id for one in other.map.keyframes]

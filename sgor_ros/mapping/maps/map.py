@@ -1,6 +1,7 @@
 """`Map`: nodes with poses, edges between them, and the scans of some: what a drive leaves."""
 from collections.abc import Iterable
 from collections.abc import Iterator
+from concurrent.futures import Executor
 from dataclasses import dataclass
 from dataclasses import field
 from functools import cached_property
@@ -126,15 +127,21 @@ class Map:
         """
         return locate(self, scan, hint)
 
-    def merge(self, other: 'Map') -> Merged:
+    def merge(self, other: 'Map', executor: Executor | None = None) -> Merged:
         """Join another map of the same place to this one; neither of them changes.
+
+        Parameters
+        ----------
+        other : Map
+        executor : concurrent.futures.Executor, optional
+            Where keyframes are located, in processes of its own; without it here.
 
         Raises
         ------
         InputError
             The maps were made with settings that do not go together.
         """
-        return merge(self, other)
+        return merge(self, other, executor)
 
     def scans(self, *, of_base: bool = False) -> Iterator[tuple[Array, CompactScan]]:
         """Yield T_map_sensor and scan of each keyframe, for the cloud or the grid of the map.

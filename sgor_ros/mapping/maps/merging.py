@@ -1,4 +1,6 @@
 """Two maps of one place become one: keyframes of the one are found in the other."""
+from collections.abc import Iterable
+from concurrent.futures import Executor
 from dataclasses import dataclass
 from dataclasses import replace
 from itertools import combinations
@@ -24,6 +26,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+TOGETHER = 16
+"""Keyframes that are located by one task, where there are processes for it."""
 FEWEST = 2
 """So many keyframes of the other map, that agree with each other, join two maps."""
 
@@ -58,7 +62,7 @@ class Merged:
         return f'Merged({self.map if self.success else self.reason})'
 
 
-def merge(known: 'Map', other: 'Map') -> Merged:
+def merge(known: 'Map', other: 'Map', executor: Executor | None = None) -> Merged:
     """Join two maps: see `Map.merge`."""
     check_alike(other.config, known.config, 'other', 'this map')
     graph = PoseGraph()
@@ -67,11 +71,8 @@ def merge(known: 'Map', other: 'Map') -> Merged:
     offset = max(known.nodes, default=-1) + 1 - min(other.nodes, default=0)
     moved = [_moved(edge, offset) for edge in other.edges]
     located = {}
-    for keyframe in other.keyframes:
-        found = locate(known, keyframe.scan.restored())
-        if found.success:
-            located[keyframe.id + offset] = [replace(edge, source=keyframe.id + offset)
-                                             for edge in found.edges]
+    for node, edges in _all_located(known, other, executor):
+        located[node + offset] = [replace(edge, source=node + offset) for edge in edges]
     consistency = LoopConsistency()
     consistency.begin_anew([*known.edges, *moved])
     agreeing = _agreeing(located, consistency)
@@ -95,6 +96,30 @@ def merge(known: 'Map', other: 'Map') -> Merged:
     T_map_other = (graph.pose(first)
                    @ se3.inverse(other.nodes[first - offset].T_map_sensor))
     return Merged(True, '', joined, T_map_other, tuple(believed), len(located))
+
+
+def _all_located(known: 'Map', other: 'Map', executor: Executor | None
+                 ) -> Iterable[tuple[int, tuple[Edge, ...]]]:
+    """Return the keyframes of the other map that are found in this one, in their order."""
+    nodes = [keyframe.id for keyframe in other.keyframes]
+    if executor is None:
+        return _located(known, other, nodes)
+    # what is sent: scans that lie in files are read where they are needed
+    known = replace(known, keyframes=known.keyframes.copy(),
+                    config=known.config.replace(threads=1))
+    tasks = []
+    for first in range(0, len(nodes), TOGETHER):
+        some = nodes[first:first + TOGETHER]
+        part = replace(other, nodes={}, edges=(), keyframes=other.keyframes.copy(some))
+        tasks.append(executor.submit(_located, known, part, some))
+    return [one for task in tasks for one in task.result()]
+
+
+def _located(known: 'Map', other: 'Map', nodes: Iterable[int]
+             ) -> list[tuple[int, tuple[Edge, ...]]]:
+    """Return those of some keyframes that are found, with the loops to them."""
+    found = [(node, locate(known, other.keyframes.restored(node))) for node in nodes]
+    return [(node, one.edges) for node, one in found if one.success]
 
 
 def check_alike(one: SgorConfig, other: SgorConfig, name: str, other_name: str) -> None:
