@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from .. import visualize
 from ..core.common.settings import InputError
 from ..core.config import SgorConfig
 from ..core.warmup import warm_up
@@ -38,6 +39,7 @@ from .command_line import run
 from .options import add_params_file
 from .options import add_preset
 from .options import add_settings
+from .options import add_visualize
 from .options import configured
 from .options import PRESETS
 from .options import read_parameters
@@ -142,6 +144,8 @@ def show(arguments: Namespace) -> int:
     """Tell what the map holds, and draw it; with a scan, where it was found."""
     if arguments.output:
         check_file(arguments.output, '--output', PICTURES)
+    if arguments.visualize is not None:
+        visualize.check(arguments.visualize)
     known = _loaded(arguments.map)
     print(_in_words(known))
     for session in known.sessions:
@@ -156,6 +160,9 @@ def show(arguments: Namespace) -> int:
         plot_map(arguments.output, f'{arguments.map.resolve().name}: {_in_words(known)}', known,
                  points, found)
         print(f'wrote {arguments.output}')
+    if arguments.visualize is not None:
+        with visualize.map_view(arguments.visualize) as look:
+            look.show(known, found, '\n'.join((_in_words(known), _where(found) if found else '')))
     return OK if found is None or found.success else FAILED
 
 
@@ -265,6 +272,7 @@ def _parser() -> Parser:
     one.add_argument('--output', type=Path, metavar='PICTURE', help=f'({", ".join(PICTURES)})')
     one.add_argument('--scan', type=Path, metavar='SCAN', help='to find in it')
     _add_labels(one)
+    add_visualize(one)
     return top
 
 

@@ -1,4 +1,4 @@
-"""A live look, through rerun: what the tracker does of a drive, what a registration did."""
+"""A look through rerun: what the tracker does of a drive, what a registration did, a map."""
 from importlib.util import find_spec
 import os
 from pathlib import Path
@@ -11,6 +11,7 @@ from ..core.common.settings import InputError
 from ..core.config import SgorConfig
 
 if TYPE_CHECKING:    # rerun is an extra
+    from .known_map import MapView
     from .pair import PairView
     from .track import TrackView
 
@@ -45,6 +46,13 @@ def pair_view(target: str | Path, config: SgorConfig) -> 'PairView':
     check(target)
     from .pair import PairView
     return PairView(target, config)
+
+
+def map_view(target: str | Path) -> 'MapView':
+    """Return what shows a map; parameter and errors as of `track_view`."""
+    check(target)
+    from .known_map import MapView
+    return MapView(target)
 
 
 def check(target: str | Path) -> None:

@@ -13,12 +13,15 @@ from return_drive import PERIOD_NS
 from return_drive import return_drive
 from return_drive import THERE
 from return_drive import TURN
+from scipy.spatial import cKDTree
 import yaml
 
 from sgor_ros import Map
 from sgor_ros.commands.map import main
 from sgor_ros.core.common import se3
+from sgor_ros.io.frames import parse_transform
 from sgor_ros.io.trajectories import write_kitti
+from sgor_ros.mapping.edge import Kind
 
 pytest.importorskip('gtsam')
 
@@ -158,6 +161,82 @@ def test_show_draws_the_map_and_where_a_scan_was_found(work, tmp_path):
     image = np.asarray(Image.open(tmp_path / 'map.png').convert('RGB'))
     assert image.shape[0] > 500
     assert len(np.unique(image.reshape(-1, 3), axis=0)) > 50
+
+
+@pytest.mark.parametrize('labels', [True, False])
+def test_show_into_rerun_holds_cloud_keyframes_edges_and_the_place(work, tmp_path, labels):
+    pytest.importorskip('rerun', reason='the extra visualize is not installed')
+    from test_visualize import component
+    from test_visualize import entities
+    both = work / 'map_merged'
+    if not both.exists():
+        Map.load(work / 'map_there').merge(Map.load(work / 'map_back')).map.save(both)
+    known = Map.load(both)
+    named = ['--labels', str(work / 'back/labels/000010.label')] if labels else []
+    assert main(['show', str(both), '--visualize', str(tmp_path / 'map.rrd'), '--scan',
+                 str(work / 'back/velodyne/000010.bin'), *named]) == 0
+    found = entities(tmp_path / 'map.rrd')
+    assert len(component(found['/map/cloud'], ':positions')[0]) > 10000
+    keyframes, = component(found['/map/keyframes'], ':positions')
+    np.testing.assert_allclose(keyframes, known.positions[1], atol=1e-4)
+    for kind in Kind:
+        ends, = component(found[f'/map/edges/{kind.value}'], ':strips')
+        expected = [known.poses((edge.target, edge.source))[:, :3, 3] for edge in known.edges
+                    if edge.kind is kind]
+        assert len(expected) >= 4
+        np.testing.assert_allclose(ends, expected, atol=1e-4)
+    at, = component(found['/map/scan/found/0'], 'translation')
+    assert np.linalg.norm(at[0] - truth(BACK + 10)[:3, 3]) < 0.1
+
+
+def test_merge_over_processes_gives_the_same_map(work, tmp_path, capsys):
+    one, two = str(work / 'map_there'), str(work / 'map_back')
+    assert main(['merge', one, two, '--output', str(tmp_path / 'here')]) == 0
+    assert main(['merge', one, two, '--output', str(tmp_path / 'there'), '--processes', '2']) == 0
+    for name in ('graph.npz', 'keyframes.npz'):
+        assert (tmp_path / 'here' / name).read_bytes() == (tmp_path / 'there' / name).read_bytes()
+    capsys.readouterr()
+    for option, said in ((('--dask', 'tcp://127.0.0.1:1'), 'no scheduler there'),
+                         (('--processes', '0'), '--processes 0: expected 1 or more')):
+        assert main(['merge', one, two, '--output', str(tmp_path / 'none'), *option]) == 2
+        assert said in capsys.readouterr().err
+    assert not (tmp_path / 'none').exists()
+
+
+def test_a_tilted_sensor_gives_an_upright_grid_and_cloud(work, tmp_path):
+    """It looks down by 20 degrees: the same street, seen from its base, has the same ground."""
+    tilt = parse_transform('0.5 0 1.73 0 0.35 0', 'mount')
+    untilt = np.linalg.inv(tilt)
+    for name in ('velodyne', 'labels'):
+        (tmp_path / 'tilted' / name).mkdir(parents=True)
+    for i in range(THERE):
+        points, labels, _ = return_drive()[i]
+        # the sensor of the drive is 1.73 m over the ground, where this base has its origin
+        seen = se3.transform(untilt @ parse_transform('0.5 0 1.73 0 0 0', 'up'),
+                             points.astype(np.float64))
+        np.column_stack((seen, np.ones(len(seen)))).astype(np.float32).tofile(
+            tmp_path / f'tilted/velodyne/{i:06d}.bin')
+        labels.astype(np.uint32).tofile(tmp_path / f'tilted/labels/{i:06d}.label')
+    assert main(['build', str(tmp_path / 'tilted'), '--output', str(tmp_path / 'map'),
+                 '--base-frame', 'base_link', '--T-base-sensor', '0.5 0 1.73 0 0.35 0']) == 0
+    np.testing.assert_allclose(Map.load(tmp_path / 'map').T_base_sensor, tilt)
+    assert main(['export', str(tmp_path / 'map'), str(tmp_path / 'map.ply')]) == 0
+    assert main(['export', str(work / 'map_there'), str(tmp_path / 'level.ply')]) == 0
+    tilted, level = (np.asarray(open3d.io.read_point_cloud(str(tmp_path / name)).points)
+                     for name in ('map.ply', 'level.ply'))
+    # by clouds: the one that was mounted lies where the other does, and the base on the ground
+    expected = level + [0.5, 0, 1.73]
+    near = cKDTree(expected).query(tilted)[0]
+    assert np.percentile(near, 90) < 0.4
+    ground = tilted[np.linalg.norm(tilted[:, :2], axis=1) < 10, 2]
+    assert np.percentile(ground, 10) == pytest.approx(0, abs=0.15)
+    assert main(['export', str(tmp_path / 'map'), str(tmp_path / 'map.yaml'),
+                 '--resolution', '0.2']) == 0
+    about = yaml.safe_load((tmp_path / 'map.yaml').read_text())
+    image = np.asarray(Image.open(tmp_path / about['image']))[::-1].astype(float)
+    way = np.array([truth(i)[:2, 3] for i in range(THERE)]) + [0.5, 0]
+    column, row = np.floor((way - about['origin'][:2]) / about['resolution']).astype(int).T
+    assert ((255 - image[row, column]) / 255 < about['free_thresh']).mean() > 0.9
 
 
 @pytest.mark.parametrize(('arguments', 'said'), [
