@@ -86,9 +86,9 @@ def _add_common(command: ArgumentParser) -> None:
                          'where there is no --data')
     command.add_argument('--seed', type=int, default=0, help='chooses pairs, turns and noise')
     command.add_argument('--cores', type=positive, default=2, help='of the processor, for all')
-    command.add_argument('--output', type=Path, metavar='FOLDER', help='for the results, must not '
-                         'exist; default: out/benchmark/COMMAND, and _2, _3, ... behind it where '
-                         'that exists')
+    command.add_argument('-o', '--output', type=Path, metavar='FOLDER', help='for the results, '
+                         'must not exist; default: out/benchmark/COMMAND, and _2, _3, ... behind '
+                         'it where that exists')
 
 
 @contextmanager

@@ -74,7 +74,7 @@ def _parse(arguments: list[str] | None) -> argparse.Namespace:
         'done; a slow machine that leaves scans out is told so',
         'the node ended, was silent, failed often, or drifted by more than '
         f'{WORST_DRIFT_PERCENT:g} %')
-    parser.add_argument('--out', type=Path, default=Path('out/demo'),
+    parser.add_argument('-o', '--out', '--output', type=Path, default=Path('out/demo'),
                         help='folder for the bag, the pictures and the log; those of an older '
                         'demo are replaced')
     parser.add_argument('--scans', type=int, default=120,

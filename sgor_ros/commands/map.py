@@ -228,7 +228,7 @@ def _parser() -> Parser:
     one.add_argument('bag_path', type=Path, metavar='DRIVE', help='bag, or folder of scans')
     _add_output(one)
     one.add_argument('--map', type=Path, metavar='MAP', help='to go on in; its settings are taken')
-    one.add_argument('--topic', help='of the clouds; found where there is but one')
+    one.add_argument('-t', '--topic', help='of the clouds; found where there is but one')
     one.add_argument('--sequence', metavar='NAME', help='of the drives of a folder; found where '
                      'there is but one')
     add_params_file(one)
@@ -240,8 +240,8 @@ def _parser() -> Parser:
     _add_map(one)
     one.add_argument('scan', type=Path, metavar='SCAN', help='.bin, .pcd, .ply or .npz')
     _add_labels(one)
-    one.add_argument('--json', type=Path, metavar='FILE', help='write the result to; an older '
-                     'file is replaced')
+    one.add_argument('-j', '--json', type=Path, metavar='FILE', help='write the result to; an '
+                     'older file is replaced')
     one = command(merge, 'MAP OTHER --output MAP', 'maps/yard maps/street --output maps/both')
     _add_map(one)
     one.add_argument('other', type=Path, metavar='OTHER', help='of the same place, in part')
@@ -253,7 +253,8 @@ def _parser() -> Parser:
     one.add_argument('--resolution', type=float, default=0.1, help='edge of a cell, m')
     one = command(show, 'MAP [options]', 'maps/yard --output yard.png --scan scan.bin')
     _add_map(one)
-    one.add_argument('--output', type=Path, metavar='PICTURE', help=f'({", ".join(PICTURES)})')
+    one.add_argument('-o', '--output', type=Path, metavar='PICTURE',
+                     help=f'({", ".join(PICTURES)})')
     one.add_argument('--scan', type=Path, metavar='SCAN', help='to find in it')
     _add_labels(one)
     return top
@@ -265,8 +266,8 @@ def _add_map(to: Parser) -> None:
 
 
 def _add_output(to: Parser) -> None:
-    to.add_argument('--output', type=Path, metavar='MAP', required=True, help='folder of the map; '
-                    'a map that is there is replaced once the new one is complete')
+    to.add_argument('-o', '--output', type=Path, metavar='MAP', required=True, help='folder of '
+                    'the map; a map that is there is replaced once the new one is complete')
 
 
 def _add_labels(to: Parser) -> None:

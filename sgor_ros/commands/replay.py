@@ -186,10 +186,10 @@ def _parser() -> Parser:
         'done; scans that failed are told and counted',
         'no scan could be registered to another; the results are written')
     command.add_argument('bag_path', type=Path, metavar='BAG', help='or folder of scans')
-    command.add_argument('--topic', help='of the clouds; found where there is but one')
+    command.add_argument('-t', '--topic', help='of the clouds; found where there is but one')
     command.add_argument('--sequence', metavar='NAME', help='of the drives of a folder; found '
                          'where there is but one')
-    command.add_argument('--output', type=Path, metavar='FOLDER',
+    command.add_argument('-o', '--output', type=Path, metavar='FOLDER',
                          help='for the results, must not exist; default: out/NAME_replay with the '
                          'name of the bag, and _2, _3, ... behind it where that exists')
     command.add_argument('--truth', type=Path, metavar='FILE', help='true poses of the sensor, '
@@ -206,7 +206,7 @@ def _parser() -> Parser:
     add_settings(command, 'clouds and frames', StreamConfig)
     add_settings(command, 'tracker', TrackerConfig)
     add_settings(command, 'loops', MapperConfig)
-    add_settings(command, 'registration (defaults are those of the preset outdoor)', SgorConfig)
+    add_settings(command, 'registration', SgorConfig)
     return command
 
 
