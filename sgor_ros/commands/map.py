@@ -103,6 +103,8 @@ def merge(arguments: Namespace) -> int:
     """Make one map of two and write it; 1 where they share nothing."""
     known, other = (_loaded(folder) for folder in (arguments.map, arguments.other))
     warm_up(known.config)
+    print(f'looking for {len(other.keyframes)} keyframes of {arguments.other} in {arguments.map}',
+          file=sys.stderr)
     merged = known.merge(other)
     if merged.map is None:
         print(f'not merged: {merged.reason}')

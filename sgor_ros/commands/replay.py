@@ -8,7 +8,6 @@ import sys
 from typing import TYPE_CHECKING
 
 import numpy as np
-from tqdm import tqdm
 
 from .. import visualize
 from ..core.common.settings import InputError
@@ -25,6 +24,7 @@ from ..io.label_field import AUTO
 from ..io.label_field import NONE
 from ..io.sequence import ScanSequence
 from ..io.stream_config import StreamConfig
+from ..io.terminal import progress
 from ..io.trajectories import read_timed_poses
 from ..io.writing import free_folder
 from ..io.writing import new_folder
@@ -155,13 +155,14 @@ def run_sequence(sequence: ScanSequence, pipeline: Pipeline, view: 'TrackView | 
     rows: list[Row] = []
     broken: InputError | None = None
     try:
-        for scan in tqdm(sequence, total=sequence.expected, unit='scan', disable=None):
-            warnings.note(scan.note)
-            outcome = pipeline.process(scan)
-            if view and outcome.scan is not None and outcome.tracked is not None:
-                view.show(outcome.scan, outcome.tracked)
-            warnings.add_those_of(outcome)
-            rows.append(outcome.row())
+        with progress(sequence.name, sequence.expected, 'scan') as told:
+            for scan in told.over(sequence):
+                warnings.note(scan.note)
+                outcome = pipeline.process(scan)
+                if view and outcome.scan is not None and outcome.tracked is not None:
+                    view.show(outcome.scan, outcome.tracked)
+                warnings.add_those_of(outcome)
+                rows.append(outcome.row())
     except InputError as error:
         broken = error    # what came before is worth keeping
     if broken and not rows:

@@ -38,6 +38,7 @@ from ..evaluation.runner import run
 from ..io.datasets import Drive
 from ..io.datasets import DriveScan
 from ..io.datasets import open_drives
+from ..io.terminal import show
 from ..io.writing import STDOUT
 from . import command_line
 from .benchmarks import inputs
@@ -125,7 +126,7 @@ def _tables(arguments: Namespace) -> int:
                variants=studies.variants(study, arguments.values, arguments.seed),
                processes=arguments.processes, dask=arguments.dask, data=_data(arguments))
     inputs.say(page.keep_earlier(output, rows))
-    print(page.write(output, rows, protocol, methods, study, features))
+    show(page.write(output, rows, protocol, methods, study, features))
     return command_line.OK
 
 
