@@ -34,6 +34,7 @@ from .command_line import FAILED
 from .command_line import OK
 from .command_line import Parser
 from .command_line import run
+from .options import add_labels
 from .options import add_params_file
 from .options import add_preset
 from .options import add_settings
@@ -233,6 +234,7 @@ def _parser() -> Parser:
     one.add_argument('-t', '--topic', help='of the clouds; found where there is but one')
     one.add_argument('--sequence', metavar='NAME', help='of the drives of a folder; found where '
                      'there is but one')
+    add_labels(one)
     add_params_file(one)
     add_preset(one)
     for title, settings in (('clouds and frames', StreamConfig), ('tracker', TrackerConfig),

@@ -68,6 +68,13 @@ def add_params_file(to: Parser) -> None:
                     help='settings in the format of ROS parameter files; options go before')
 
 
+def add_labels(to: Parser) -> None:
+    """Add the option for the labels of a folder of scans."""
+    to.add_argument('--labels', type=Path, metavar='FOLDER', help='with a .label for each scan of '
+                    'a folder, by its name: a path, or one beside the scans such as '
+                    'predicted_labels; default: the best that there are')
+
+
 def add_visualize(to: Parser) -> None:
     """Add the option for a live look."""
     to.add_argument('-v', '--visualize', nargs='?', const=VIEWER, default=None, metavar='FILE.rrd',
