@@ -7,6 +7,7 @@ from pathlib import Path
 import sys
 
 from docutils import nodes
+from numpydoc.xref import DEFAULT_LINKS
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
@@ -26,6 +27,7 @@ html_show_sphinx = False
 myst_heading_anchors = 4
 # types in them are links, to classes of this package; whether they are is seen without the network
 numpydoc_xref_param_type = True
+DEFAULT_LINKS.clear()    # those lead to the sites of Python and numpy
 numpydoc_xref_ignore = 'all'
 numpydoc_xref_aliases = {name: f'sgor_ros.{name}' for name in api.__all__}
 # numpydoc sections have the types, with shapes and units, which annotations can't

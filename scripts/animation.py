@@ -1,4 +1,4 @@
-"""Draw docs/images/animation.gif: a tunnel and a facade that are refused, and a loop that is closed.
+"""Draw docs/images/animation.gif: a tunnel and a facade that are refused, and a loop closed.
 
 All of it is computed by the code that registers and maps, in the built-in world. Usage, from the
 checkout: .venv/bin/python scripts/animation.py [FILE]
