@@ -23,7 +23,9 @@ from sgor_ros import SgorConfig
 from sgor_ros import Status
 from sgor_ros.core.common import se3
 from sgor_ros.mapping.edge import Edge
-from sgor_ros.mapping.keyframe import Keyframes
+from sgor_ros.mapping.keyframe import Keyframe
+from sgor_ros.mapping.maps import localisation
+from sgor_ros.mapping.maps.localisation import AT_ONCE
 
 pytest.importorskip('gtsam')
 
@@ -191,11 +193,10 @@ def test_a_hint_may_be_wrong(hint):
 
 def test_a_hint_comes_first(monkeypatch):
     asked = []
-    restored = Keyframes.restored
-    monkeypatch.setattr(Keyframes, 'restored', lambda self, node: (
-        asked.append(node), restored(self, node))[1])
+    monkeypatch.setattr(Keyframe, 'scan', property(lambda self: (
+        asked.append(self.id), self.held)[1]))
     known_map().locate(scan_of(BACK[1]), truth(0))
-    assert asked[0] == min(known_map().nodes)
+    assert min(known_map().nodes) in asked[:AT_ONCE]
 
 
 @pytest.mark.parametrize('hint', [np.zeros(3), np.full((4, 4), np.nan), np.diag([2, 1, 1, 1])])
@@ -239,3 +240,27 @@ def test_another_real_drive_is_refused(real, data_folder):
     foreign = open_drive(data_folder.parent / 'drives/hdl32')
     for scan in list(foreign)[10:40:20]:
         assert not real[0].locate(scan.read()).success
+
+
+@pytest.mark.parametrize('index', [2, BACK[1]])
+def test_one_thread_and_two_find_the_same(index):
+    known = known_map()
+    one, two = (replace(known, config=known.config.replace(threads=threads)).locate(
+        scan_of(index, 1.0)) for threads in (1, 2))
+    assert np.array_equal(one.T_map_sensor, two.T_map_sensor)
+    assert np.array_equal(one.covariance, two.covariance)
+    assert one.attempts == two.attempts
+
+
+def test_only_what_a_quick_attempt_does_not_rule_out_is_tried_thoroughly(monkeypatch, elsewhere):
+    tried = []
+    monkeypatch.setattr(localisation, 'register', lambda source, target, config: (
+        tried.append(config.max_correspondences), register(source, target, config))[1])
+    points, labels, _ = elsewhere[0]
+    for hopeless, thorough in ((0.5, 0), (-1.0, localisation.THOROUGH)):
+        tried.clear()
+        monkeypatch.setattr(localisation, 'HOPELESS', hopeless)
+        found = known_map().locate(SemanticScan(points, labels))
+        assert not found.success
+        assert tried.count(SgorConfig.max_correspondences) == thorough
+        assert found.attempts == len(tried) == localisation.QUICK + thorough
