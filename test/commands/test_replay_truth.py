@@ -123,6 +123,13 @@ def test_stamps_of_tum_are_exact(tmp_path):
         read_timed_poses(tmp_path / 'nowhere')
 
 
+def test_lines_end_where_numpy_ends_them(tmp_path):
+    (tmp_path / 'a.tum').write_text('1.5 1 2\x0c3 0 0 0 1\n2.5 1 2 3 0 0 0 1\n')
+    stamps_ns, poses = read_timed_poses(tmp_path / 'a.tum')
+    assert stamps_ns.tolist() == [1_500_000_000, 2_500_000_000]
+    assert len(poses) == 2
+
+
 def pose_messages(types, kind, stamp_ns, T):
     """Return a message with a pose, of any of the types that serve as truth."""
     odometry = odometry_of(types, T, stamp_ns, 'map', 'lidar')
