@@ -17,8 +17,8 @@ OPEN3D = ['open3d-cpu>=0.18']
 COMMANDS_NEED = [
     'matplotlib',
     'pyyaml',
+    'rich',
     'rosbags~=0.11.0',    # its 0.x releases remove names
-    'tqdm',
 ]
 # and APE and RPE, the other methods, their matches from depth maps, and a cluster to run on
 EVALUATION = [*COMMANDS_NEED, *OPEN3D, 'evo', 'kiss-icp', 'kiss_matcher', 'small_gicp>=1.0',
@@ -92,6 +92,7 @@ setup(
     },
     entry_points={
         'console_scripts': [
+            'sgor = sgor_ros.commands.entry:sgor',
             'sgor_node = sgor_ros.ros.main:main',
             *(f'sgor_{name} = sgor_ros.commands.entry:{name}' for name in COMMANDS)],
     },

@@ -7,11 +7,13 @@ from pathlib import Path
 import sys
 
 from docutils import nodes
+from numpydoc.xref import DEFAULT_LINKS
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from sgor_ros import api
 from sgor_ros.core.common.settings import Setting
 from sgor_ros.core.common.settings import Settings
 
@@ -23,6 +25,11 @@ html_title = 'sgor_ros'
 html_show_sphinx = False
 # deep enough for all links to headings, which are written as GitHub makes their anchors
 myst_heading_anchors = 4
+# types in them are links, to classes of this package; whether they are is seen without the network
+numpydoc_xref_param_type = True
+DEFAULT_LINKS.clear()    # those lead to the sites of Python and numpy
+numpydoc_xref_ignore = 'all'
+numpydoc_xref_aliases = {name: f'sgor_ros.{name}' for name in api.__all__}
 # numpydoc sections have the types, with shapes and units, which annotations can't
 autodoc_typehints = 'none'
 autodoc_member_order = 'bysource'

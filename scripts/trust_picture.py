@@ -150,7 +150,7 @@ def draw(axes: Any, example: Example, T: Array, width: float) -> None:
     for pose, colour in ((W, TARGET), (W @ T, SOURCE)):
         axes.plot(*pose[:2, 3], 'o', ms=9, mfc='white', mec=colour, mew=2.5, zorder=5)
     found = pose_score(outcomes)
-    axes.set_xlabel(f'{found.agree:.0%} agree, {found.contradict:.1%} contradict', fontsize=11)
+    axes.set_xlabel(f'{found.overlap:.0%} agree, {found.violations:.1%} contradict', fontsize=11)
     half = width / 2 * np.array((-1, 1))
     x, y = example.middle
     axes.set(xlim=x + half, ylim=y + ASPECT * half, aspect='equal', xticks=[], yticks=[])

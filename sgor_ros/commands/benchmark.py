@@ -52,9 +52,14 @@ def main(argv: list[str] | None = None) -> int:
 def measure(arguments: Namespace) -> int:
     """Run one of the benchmarks on some cores, into a folder of its own."""
     output = arguments.output or free_folder(Path('out/benchmark') / arguments.command)
-    with _cores(arguments.cores), new_folder(output) as place:
+    with _cores(arguments.cores), new_folder(output, part=True) as place:
         warm_up(default_config(arguments))
-        COMMANDS[arguments.command].measure(arguments, place)
+        try:
+            COMMANDS[arguments.command].measure(arguments, place)
+        except BaseException:
+            if place.is_dir():
+                say(f'what was measured until now is in {output}')
+            raise
     say(f'wrote {output}')
     return OK
 
@@ -86,9 +91,9 @@ def _add_common(command: ArgumentParser) -> None:
                          'where there is no --data')
     command.add_argument('--seed', type=int, default=0, help='chooses pairs, turns and noise')
     command.add_argument('--cores', type=positive, default=2, help='of the processor, for all')
-    command.add_argument('--output', type=Path, metavar='FOLDER', help='for the results, must not '
-                         'exist; default: out/benchmark/COMMAND, and _2, _3, ... behind it where '
-                         'that exists')
+    command.add_argument('-o', '--output', type=Path, metavar='FOLDER', help='for the results, '
+                         'must not exist; default: out/benchmark/COMMAND, and _2, _3, ... behind '
+                         'it where that exists')
 
 
 @contextmanager

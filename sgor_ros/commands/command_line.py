@@ -1,8 +1,10 @@
 """What every command has in common: its help, exit codes, and one line for what went wrong."""
+from argparse import Action
 from argparse import ArgumentDefaultsHelpFormatter
 from argparse import ArgumentParser
 from argparse import Namespace
 from argparse import RawDescriptionHelpFormatter
+from argparse import SUPPRESS
 from collections.abc import Callable
 from importlib import metadata
 import signal
@@ -43,8 +45,23 @@ class _Formatter(ArgumentDefaultsHelpFormatter, RawDescriptionHelpFormatter):
         return super()._get_help_string(action)    # type: ignore[arg-type]
 
 
+class _HelpAll(Action):
+    """Print the options that ``--help`` leaves out too."""
+
+    def __init__(self, option_strings: list[str], dest: str) -> None:
+        super().__init__(option_strings, SUPPRESS, nargs=0, help='the other options too')
+
+    def __call__(self, parser: ArgumentParser, *_: object) -> None:
+        assert isinstance(parser, Parser)
+        with standard_streams.not_needed():
+            sys.stdout.write(parser.format_all_help())
+        parser.exit()
+
+
 class Parser(ArgumentParser):
     """A parser that answers a slip in two lines, not with the usage of a hundred options.
+
+    ``--help`` tells the options that many need; ``--help-all`` those of `leave_out` too.
 
     Parameters
     ----------
@@ -69,7 +86,28 @@ class Parser(ArgumentParser):
             '', 'exit codes:', *(f'  {code:<4} {meaning}' for code, meaning in codes.items())))
         super().__init__(prog=prog, usage=f'{prog} {usage}', epilog=epilog,
                          description=fill(description, HELP_WIDTH), formatter_class=_Formatter)
-        self.add_argument('--version', action='version', version=f'sgor_ros {version()}')
+        self._left_out: dict[Action, str | None] = {}
+        self.add_argument('-V', '--version', action='version', version=f'sgor_ros {version()}')
+
+    def leave_out(self, option: Action) -> None:
+        """Let ``--help`` leave out an option, and ``--help-all`` tell it."""
+        if not self._left_out:
+            self.add_argument('--help-all', action=_HelpAll)
+        self._left_out[option] = option.help
+
+    def format_help(self) -> str:
+        """Return the help without what is left out."""
+        for option in self._left_out:
+            option.help = SUPPRESS
+        try:
+            return super().format_help()
+        finally:
+            for option, told in self._left_out.items():
+                option.help = told
+
+    def format_all_help(self) -> str:
+        """Return the help with all options."""
+        return super().format_help()
 
     def exit(self, status: int = OK, message: str | None = None) -> NoReturn:
         """End, with a message on stderr; help that nobody reads to its end is no error."""

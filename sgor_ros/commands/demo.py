@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 from rosbags.typesys import get_typestore
 from rosbags.typesys import Stores
-from tqdm import tqdm
 
 from ..core.common import se3
 from ..core.common.settings import InputError
@@ -25,6 +24,7 @@ from ..io.bags import BagReader
 from ..io.bags import CLOUD_TYPE
 from ..io.header_stamp import stamp_ns_of
 from ..io.messages import matrix_of
+from ..io.terminal import progress
 from .command_line import FAILED
 from .command_line import OK
 from .command_line import Parser
@@ -74,7 +74,7 @@ def _parse(arguments: list[str] | None) -> argparse.Namespace:
         'done; a slow machine that leaves scans out is told so',
         'the node ended, was silent, failed often, or drifted by more than '
         f'{WORST_DRIFT_PERCENT:g} %')
-    parser.add_argument('--out', type=Path, default=Path('out/demo'),
+    parser.add_argument('-o', '--out', '--output', type=Path, default=Path('out/demo'),
                         help='folder for the bag, the pictures and the log; those of an older '
                         'demo are replaced')
     parser.add_argument('--scans', type=int, default=120,
@@ -128,8 +128,8 @@ def _run(options: argparse.Namespace) -> int:
             _say(f'sgor_node is ready; playing {len(scans)} scans at {options.rate:g} Hz')
             memory = [node.memory_mb()]
             stream = _restamped(recorded.clouds, list(drive), scans)
-            player.play(tqdm(stream, 'playing', len(scans), unit='scan', disable=None),
-                        1 / options.rate, node.alive)
+            with progress('playing', len(scans), 'scan') as told:
+                player.play(told.over(stream), 1 / options.rate, node.alive)
             last = scans[-1][1]
             player.spin_until(lambda: not node.alive() or any(
                 stamp_ns_of(told.header) == last for told in player.diagnostics[-3:]),

@@ -3,14 +3,13 @@ from argparse import Namespace
 from pathlib import Path
 import sys
 
-from tqdm import tqdm
-
 from ..core.common import se3
 from ..core.common.settings import InputError
 from ..io.bags import BagWriter
 from ..io.datasets import semantickitti
 from ..io.messages import odometry_of
 from ..io.messages import point_cloud2
+from ..io.terminal import progress
 from ..io.trajectories import read_calibration
 from .command_line import OK
 from .command_line import Parser
@@ -39,8 +38,9 @@ def convert(arguments: Namespace) -> int:
     if poses is not None:
         read_calibration(folder / 'calib.txt')    # without one they would be taken for the LiDAR's
         poses = se3.inverse(poses[0]) @ poses
-    with BagWriter(arguments.out) as bag:
-        for i, stamp_ns in enumerate(tqdm(drive.stamps_ns.tolist(), unit='scan', disable=None)):
+    with (BagWriter(arguments.out) as bag,
+          progress(drive.name, len(drive), 'scan') as told):
+        for i, stamp_ns in enumerate(told.over(drive.stamps_ns.tolist())):
             scan = drive.read(i)
             bag.write(CLOUD_TOPIC, point_cloud2(bag.types, scan.points, scan.labels, stamp_ns,
                                                 LIDAR_FRAME), stamp_ns)

@@ -36,6 +36,7 @@ from .command_line import FAILED
 from .command_line import OK
 from .command_line import Parser
 from .command_line import run
+from .options import add_labels
 from .options import add_params_file
 from .options import add_preset
 from .options import add_settings
@@ -109,6 +110,8 @@ def merge(arguments: Namespace) -> int:
     # workers read the scans by the same paths
     known, other = (_loaded(folder.resolve()) for folder in (arguments.map, arguments.other))
     warm_up(known.config)
+    print(f'looking for {len(other.keyframes)} keyframes of {arguments.other} in {arguments.map}',
+          file=sys.stderr)
     with executor(arguments.processes, arguments.dask) as workers:
         merged = known.merge(other, workers)
     if merged.map is None:
@@ -240,9 +243,10 @@ def _parser() -> Parser:
     one.add_argument('bag_path', type=Path, metavar='DRIVE', help='bag, or folder of scans')
     _add_output(one)
     one.add_argument('--map', type=Path, metavar='MAP', help='to go on in; its settings are taken')
-    one.add_argument('--topic', help='of the clouds; found where there is but one')
+    one.add_argument('-t', '--topic', help='of the clouds; found where there is but one')
     one.add_argument('--sequence', metavar='NAME', help='of the drives of a folder; found where '
                      'there is but one')
+    add_labels(one)
     add_params_file(one)
     add_preset(one)
     for title, settings in (('clouds and frames', StreamConfig), ('tracker', TrackerConfig),
@@ -252,8 +256,8 @@ def _parser() -> Parser:
     _add_map(one)
     one.add_argument('scan', type=Path, metavar='SCAN', help='.bin, .pcd, .ply or .npz')
     _add_labels(one)
-    one.add_argument('--json', type=Path, metavar='FILE', help='write the result to; an older '
-                     'file is replaced')
+    one.add_argument('-j', '--json', type=Path, metavar='FILE', help='write the result to; an '
+                     'older file is replaced')
     one = command(merge, 'MAP OTHER --output MAP', 'maps/yard maps/street --output maps/both')
     _add_map(one)
     one.add_argument('other', type=Path, metavar='OTHER', help='of the same place, in part')
@@ -269,7 +273,8 @@ def _parser() -> Parser:
     one.add_argument('--resolution', type=float, default=0.1, help='edge of a cell, m')
     one = command(show, 'MAP [options]', 'maps/yard --output yard.png --scan scan.bin')
     _add_map(one)
-    one.add_argument('--output', type=Path, metavar='PICTURE', help=f'({", ".join(PICTURES)})')
+    one.add_argument('-o', '--output', type=Path, metavar='PICTURE',
+                     help=f'({", ".join(PICTURES)})')
     one.add_argument('--scan', type=Path, metavar='SCAN', help='to find in it')
     _add_labels(one)
     add_visualize(one)
@@ -282,8 +287,8 @@ def _add_map(to: Parser) -> None:
 
 
 def _add_output(to: Parser) -> None:
-    to.add_argument('--output', type=Path, metavar='MAP', required=True, help='folder of the map; '
-                    'a map that is there is replaced once the new one is complete')
+    to.add_argument('-o', '--output', type=Path, metavar='MAP', required=True, help='folder of '
+                    'the map; a map that is there is replaced once the new one is complete')
 
 
 def _add_labels(to: Parser) -> None:

@@ -1,5 +1,4 @@
 """Command line options derived from the settings."""
-from argparse import ArgumentParser
 from argparse import BooleanOptionalAction
 from argparse import Namespace
 from argparse import SUPPRESS
@@ -14,13 +13,14 @@ from ..core.common.settings import Setting
 from ..core.common.settings import Settings
 from ..core.config import SgorConfig
 from ..visualize import VIEWER
+from .command_line import Parser
 
 INDOOR = 'indoor'
 PRESETS = {'outdoor': SgorConfig.outdoor, INDOOR: SgorConfig.indoor, 'paper': SgorConfig.paper,
            'kitti_protocol': SgorConfig.kitti_protocol}
 
 
-def add_preset(to: ArgumentParser) -> None:
+def add_preset(to: Parser) -> None:
     """Add the option for the settings to start from."""
     shown = [name for name in PRESETS if name != INDOOR]
     to.add_argument('--preset', choices=list(PRESETS), default='outdoor', type=_preset,
@@ -35,22 +35,25 @@ def _preset(name: str) -> str:
     return name
 
 
-def add_settings(to: ArgumentParser, title: str, config: type[Settings]) -> None:
+def add_settings(to: Parser, title: str, config: type[Settings]) -> None:
     """Add an option for each setting: ``sigma_d`` becomes ``--sigma-d``.
 
-    Those for studies are taken too, and ``--help`` does not show them; so are names of before.
+    ``--help`` tells those that many change. Names of before are taken and told nowhere.
     """
-    group = to.add_argument_group(title)
     shown = config.shown()
+    used = to.add_argument_group(title)
+    studied = to.add_argument_group(f'{title}: for studies')
     for item in config.settings():
-        details: dict[str, Any] = {'default': SUPPRESS,
-                                   'help': _help(item) if item in shown else SUPPRESS}
+        group = used if item in shown else studied
+        details: dict[str, Any] = {'default': SUPPRESS, 'help': _help(item)}
         if item.kind is bool:
             details['action'] = BooleanOptionalAction
         else:
             details['type'] = item.kind
             details['metavar'] = item.unit or item.kind.__name__.upper()
-        group.add_argument(_option(item.name), dest=item.name, **details)
+        option = group.add_argument(_option(item.name), dest=item.name, **details)
+        if not item.common:
+            to.leave_out(option)
         for old in (old for old, new in config.RENAMED.items() if new == item.name):
             group.add_argument(_option(old), dest=item.name, **details | {'help': SUPPRESS})
 
@@ -59,15 +62,22 @@ def _option(name: str) -> str:
     return f'--{name.replace("_", "-")}'
 
 
-def add_params_file(to: ArgumentParser) -> None:
+def add_params_file(to: Parser) -> None:
     """Add the option for a YAML file as ROS nodes take it."""
     to.add_argument('--params-file', type=Path, metavar='YAML', default=SUPPRESS,
                     help='settings in the format of ROS parameter files; options go before')
 
 
-def add_visualize(to: ArgumentParser) -> None:
+def add_labels(to: Parser) -> None:
+    """Add the option for the labels of a folder of scans."""
+    to.add_argument('--labels', type=Path, metavar='FOLDER', help='with a .label for each scan of '
+                    'a folder, by its name: a path, or one beside the scans such as '
+                    'predicted_labels; default: the best that there are')
+
+
+def add_visualize(to: Parser) -> None:
     """Add the option for a live look."""
-    to.add_argument('--visualize', nargs='?', const=VIEWER, default=None, metavar='FILE.rrd',
+    to.add_argument('-v', '--visualize', nargs='?', const=VIEWER, default=None, metavar='FILE.rrd',
                     help='write what rerun shows to this file; without a file open its viewer')
 
 

@@ -94,13 +94,13 @@ def _parser() -> Parser:
     command.add_argument('--target-label-convention', metavar='STR',
                          help='where the labels of the target mean something else')
     add_preset(command)
-    command.add_argument('--json', type=Path, metavar='FILE', help='write the result to; an older '
-                         'file is replaced; -: to standard output, and all else to stderr')
-    command.add_argument('--plot', type=Path, metavar='FILE', help='draw the result to '
+    command.add_argument('-j', '--json', type=Path, metavar='FILE', help='write the result to; an '
+                         'older file is replaced; -: to standard output, and all else to stderr')
+    command.add_argument('-p', '--plot', type=Path, metavar='FILE', help='draw the result to '
                          f'({", ".join(PICTURES)}), likewise')
     add_visualize(command)
     add_params_file(command)
-    add_settings(command, 'settings (defaults are those of the preset outdoor)', SgorConfig)
+    add_settings(command, 'settings', SgorConfig)
     return command
 
 

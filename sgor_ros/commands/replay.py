@@ -8,7 +8,6 @@ import sys
 from typing import TYPE_CHECKING
 
 import numpy as np
-from tqdm import tqdm
 
 from .. import visualize
 from ..core.common.settings import InputError
@@ -25,7 +24,7 @@ from ..io.label_field import AUTO
 from ..io.label_field import NONE
 from ..io.sequence import ScanSequence
 from ..io.stream_config import StreamConfig
-from ..io.trajectories import read_timed_poses
+from ..io.terminal import progress
 from ..io.writing import free_folder
 from ..io.writing import new_folder
 from ..mapping import Mapper
@@ -40,6 +39,7 @@ from .command_line import FAILED
 from .command_line import OK
 from .command_line import Parser
 from .command_line import run
+from .options import add_labels
 from .options import add_params_file
 from .options import add_preset
 from .options import add_settings
@@ -53,6 +53,8 @@ from .replay_results import summary_of
 from .replay_results import Warnings
 from .replay_results import write_results
 from .replay_truth import compared
+from .replay_truth import GivenTruth
+from .replay_truth import read_truth
 from .replay_truth import true_poses
 from .replay_truth import Truth
 from .replay_truth import WITHOUT_EVO
@@ -76,9 +78,10 @@ def replay(arguments: Namespace) -> int:
                          'up, so it needs T_base_sensor')
     if arguments.visualize is not None:
         visualize.check(arguments.visualize)
+    given = None
     if arguments.truth is not None:
         require_evo()
-        read_timed_poses(arguments.truth)    # what is no truth is told before the work
+        given = read_truth(arguments.truth, arguments.bag_path)    # told before the work
     with ExitStack() as stack:
         sequence = open_sequence(arguments, stream, stack)
         start = PRESETS[arguments.preset]()
@@ -105,7 +108,7 @@ def replay(arguments: Namespace) -> int:
             rows, broken = run_sequence(sequence, pipeline, view, warnings)
         T_base_sensor = np.eye(4) if mount is None else mount(0, '')
         assert not isinstance(T_base_sensor, str), 'it is fixed'
-        truth = _truth(arguments, sequence, rows, warnings)
+        truth = _truth(given, sequence, rows, warnings)
         summary = summary_of(rows, warnings.texts, arguments.bag_path, sequence.name, tracker,
                              stream)
         summary['truth'], shown = compared(rows, truth, T_base_sensor)
@@ -127,20 +130,23 @@ def open_sequence(arguments: Namespace, stream: StreamConfig, stack: ExitStack) 
     """Open the bag or the folder."""
     if is_bag(arguments.bag_path):
         bag = stack.enter_context(BagReader(arguments.bag_path))
+        if arguments.labels is not None:
+            raise InputError(f'--labels {arguments.labels}: the clouds of a bag have theirs in a '
+                             'field, see --label-field')
         topic = arguments.topic or bag.find_topic(stream.label_field)
         return BagSequence(bag, topic, stream.label_field, stream.time_field)
-    drive = open_drive(arguments.bag_path, arguments.sequence)
+    drive = open_drive(arguments.bag_path, arguments.sequence, arguments.labels)
     if stream.label_field not in (AUTO, NONE):
         raise InputError(f'label_field = {stream.label_field!r}: only the clouds of a bag have '
                          f'fields; for a folder it is {AUTO} or {NONE}')
     return drive if stream.label_field == AUTO else drive.without_labels()
 
 
-def _truth(arguments: Namespace, sequence: ScanSequence, rows: list[Row], warnings: Warnings
-           ) -> Truth:
+def _truth(given: GivenTruth | None, sequence: ScanSequence, rows: list[Row],
+           warnings: Warnings) -> Truth:
     """Return the true poses; those that do not fit cost no results."""
     try:
-        truth = true_poses(arguments.truth, sequence, rows)
+        truth = true_poses(given, sequence, rows)
     except InputError as error:
         warnings.add(str(error))
         return [None] * len(rows)
@@ -155,13 +161,14 @@ def run_sequence(sequence: ScanSequence, pipeline: Pipeline, view: 'TrackView | 
     rows: list[Row] = []
     broken: InputError | None = None
     try:
-        for scan in tqdm(sequence, total=sequence.expected, unit='scan', disable=None):
-            warnings.note(scan.note)
-            outcome = pipeline.process(scan)
-            if view and outcome.scan is not None and outcome.tracked is not None:
-                view.show(outcome.scan, outcome.tracked)
-            warnings.add_those_of(outcome)
-            rows.append(outcome.row())
+        with progress(sequence.name, sequence.expected, 'scan') as told:
+            for scan in told.over(sequence):
+                warnings.note(scan.note)
+                outcome = pipeline.process(scan)
+                if view and outcome.scan is not None and outcome.tracked is not None:
+                    view.show(outcome.scan, outcome.tracked)
+                warnings.add_those_of(outcome)
+                rows.append(outcome.row())
     except InputError as error:
         broken = error    # what came before is worth keeping
     if broken and not rows:
@@ -186,15 +193,17 @@ def _parser() -> Parser:
         'done; scans that failed are told and counted',
         'no scan could be registered to another; the results are written')
     command.add_argument('bag_path', type=Path, metavar='BAG', help='or folder of scans')
-    command.add_argument('--topic', help='of the clouds; found where there is but one')
+    command.add_argument('-t', '--topic', help='of the clouds; found where there is but one')
     command.add_argument('--sequence', metavar='NAME', help='of the drives of a folder; found '
                          'where there is but one')
-    command.add_argument('--output', type=Path, metavar='FOLDER',
+    command.add_argument('-o', '--output', type=Path, metavar='FOLDER',
                          help='for the results, must not exist; default: out/NAME_replay with the '
                          'name of the bag, and _2, _3, ... behind it where that exists')
-    command.add_argument('--truth', type=Path, metavar='FILE', help='true poses of the sensor, '
-                         'TUM (by time) or KITTI (a line for each scan), to compare with; '
-                         'default: those that come with the data')
+    command.add_argument('--truth', metavar='FILE', help='true poses of the sensor to compare '
+                         'with: TUM (by time) or KITTI (a line for each scan), or a topic of the '
+                         'bag (odometry, stamped poses or transforms); default: those that come '
+                         'with the data')
+    add_labels(command)
     command.add_argument('--bag', action='store_true',
                          help='also write a bag with /pose, /odometry and /correspondences')
     command.add_argument('--loops', action='store_true', help='close loops: also write corrected '
@@ -206,7 +215,7 @@ def _parser() -> Parser:
     add_settings(command, 'clouds and frames', StreamConfig)
     add_settings(command, 'tracker', TrackerConfig)
     add_settings(command, 'loops', MapperConfig)
-    add_settings(command, 'registration (defaults are those of the preset outdoor)', SgorConfig)
+    add_settings(command, 'registration', SgorConfig)
     return command
 
 

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from tqdm import tqdm
 
 from ..evaluation.report.track_plots import plot_track
 from ..io.environment import describe_environment
@@ -36,7 +35,7 @@ class Warnings:
         """Tell `text`, if it is new: it is no warning."""
         if text and text not in self._noted:
             self._noted.add(text)
-            tqdm.write(text, file=sys.stderr)
+            print(text, file=sys.stderr)
 
     def add(self, text: str) -> None:
         """Tell `text`, if it is new."""
@@ -44,9 +43,9 @@ class Warnings:
             return
         self.texts.append(text)
         if len(self.texts) <= PRINTED_WARNINGS:
-            tqdm.write(f'warning: {text}', file=sys.stderr)
+            print(f'warning: {text}', file=sys.stderr)
         elif len(self.texts) == PRINTED_WARNINGS + 1:
-            tqdm.write('warning: more of them are in summary.json', file=sys.stderr)
+            print('warning: more of them are in summary.json', file=sys.stderr)
 
     def add_those_of(self, outcome: Outcome) -> None:
         """Tell what is wrong with a scan."""

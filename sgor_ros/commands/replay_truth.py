@@ -1,5 +1,6 @@
 """The track of `sgor_replay` against true poses, where they are known."""
 from collections.abc import Sequence
+from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,8 @@ from ..evaluation.metrics.trajectory import rmse
 from ..evaluation.metrics.trajectory import STRETCHES_M
 from ..evaluation.metrics.trajectory import track_errors
 from ..evaluation.metrics.trajectory import travelled_m
+from ..io.bags import BagReader
+from ..io.bags import is_bag
 from ..io.sequence import ScanSequence
 from ..io.trajectories import read_timed_poses
 from ..pipeline.outcome import Row
@@ -27,43 +30,73 @@ WITHOUT_EVO = ("true poses are not compared, which needs evo: pip install "
                "'sgor_ros[evaluation]'")
 
 
-def true_poses(path: Path | None, sequence: ScanSequence, rows: Sequence[Row]) -> Truth:
+@dataclass(frozen=True, eq=False)
+class GivenTruth:
+    """True poses that the user names.
+
+    Attributes
+    ----------
+    name : str
+        The file or the topic.
+    stamps_ns : (N,) int64 or None
+        Increasing; None where there is a pose for each scan instead.
+    poses : (N, 4, 4) float64
+    """
+
+    name: str
+    stamps_ns: NDArray[np.int64] | None
+    poses: Array
+
+
+def read_truth(name: str, data: Path) -> GivenTruth:
+    """Read true poses: of a file, TUM or KITTI, or of a topic of the bag `data`.
+
+    Raises
+    ------
+    InputError
+        A file or a topic that has none.
+    """
+    if is_bag(data) and not Path(name).exists():
+        with BagReader(data) as bag:
+            return GivenTruth(name, *bag.timed_poses(name))
+    return GivenTruth(name, *read_timed_poses(name))
+
+
+def true_poses(given: GivenTruth | None, sequence: ScanSequence, rows: Sequence[Row]) -> Truth:
     """Return the true pose of the sensor for each scan, (4, 4), in any one frame.
 
     Parameters
     ----------
-    path : Path or None
-        TUM: the pose next in time to each scan; KITTI: a line for each scan. None: those that
-        come with the sequence.
+    given : GivenTruth or None
+        With stamps: the pose next in time to each scan. None: those that come with the sequence.
     sequence : ScanSequence
     rows : sequence of Row
 
     Raises
     ------
     InputError
-        A file that is none, or not for these scans.
+        They are not for these scans.
     """
-    if path is None:
+    if given is None:
         known = sequence.T_world_sensor
         poses: list[Array | None] = [] if known is None else list(known[:len(rows)])
     else:
-        stamps_ns, listed = read_timed_poses(path)
-        poses = (_by_line(path, listed, sequence, rows) if stamps_ns is None
-                 else _by_time(path, stamps_ns, listed, rows))
+        poses = (_by_line(given, sequence, rows) if given.stamps_ns is None
+                 else _by_time(given.name, given.stamps_ns, given.poses, rows))
     poses += [None] * (len(rows) - len(poses))
     return [None if T is None or np.isnan(T).any() else T for T in poses]
 
 
-def _by_line(path: Path, listed: Array, sequence: ScanSequence, rows: Sequence[Row]
+def _by_line(given: GivenTruth, sequence: ScanSequence, rows: Sequence[Row]
              ) -> list[Array | None]:
     expected = len(rows) if sequence.expected is None else sequence.expected
-    if len(listed) != expected:
-        raise InputError(f'--truth {path}: {len(listed)} poses for {expected} scans; in the '
-                         'format of KITTI there is a line for each')
-    return list(listed[:len(rows)])
+    if len(given.poses) != expected:
+        raise InputError(f'--truth {given.name}: {len(given.poses)} poses for {expected} scans; '
+                         'in the format of KITTI there is a line for each')
+    return list(given.poses[:len(rows)])
 
 
-def _by_time(path: Path, stamps_ns: NDArray[np.int64], listed: Array, rows: Sequence[Row]
+def _by_time(name: str, stamps_ns: NDArray[np.int64], listed: Array, rows: Sequence[Row]
              ) -> list[Array | None]:
     scans = np.array([row.stamp_ns for row in rows], np.int64)
     after = np.searchsorted(stamps_ns, scans).clip(1, max(len(stamps_ns) - 1, 1))
@@ -73,7 +106,7 @@ def _by_time(path: Path, stamps_ns: NDArray[np.int64], listed: Array, rows: Sequ
     near = np.abs(stamps_ns[nearest] - scans) <= round(NEAR_S * 1e9)
     if not near.any():
         raise InputError(
-            f'--truth {path}: no pose within {NEAR_S:g} s of a scan: it goes from '
+            f'--truth {name}: no pose within {NEAR_S:g} s of a scan: it goes from '
             f'{stamps_ns[0] * 1e-9:.3f} to {stamps_ns[-1] * 1e-9:.3f} s, the scans from '
             f'{scans[0] * 1e-9:.3f} to {scans[-1] * 1e-9:.3f} s')
     return [listed[i] if close else None for i, close in zip(nearest, near, strict=True)]

@@ -7,6 +7,7 @@ from functools import partial
 from importlib import import_module
 from pathlib import Path
 import sys
+from typing import Any
 
 from ..core.common.settings import InputError
 from ..core.config import SgorConfig
@@ -37,6 +38,7 @@ from ..evaluation.runner import run
 from ..io.datasets import Drive
 from ..io.datasets import DriveScan
 from ..io.datasets import open_drives
+from ..io.terminal import show
 from ..io.writing import STDOUT
 from . import command_line
 from .benchmarks import inputs
@@ -58,6 +60,10 @@ def _parser() -> command_line.Parser:
         'again with the same --output.',
         ('sgor_tables strides', 'sgor_tables kitti-10m --data sequences --output out/kitti'))
     add = parser.add_argument
+
+    def rare(*names: str, **details: Any) -> None:
+        parser.leave_out(add(*names, **details))
+
     add('protocol', choices=list(PROTOCOLS),
         help='kitti-10m: the 555 pairs by their rule or --list; kitti-loops: lists of loops in '
         'bands; 3dmatch: fragments and gt.log, 3DLoMatch likewise; depth: single depth maps; '
@@ -68,32 +74,32 @@ def _parser() -> command_line.Parser:
         'of 3DMatch; without it the built-in world')
     add('--list', type=Path, nargs='+', metavar='FILE', default=(),
         help='pairs with their truth: rows of "sequence i sequence j" and a 4x4 matrix')
-    add('--refine-truth', action='store_true',
+    rare('--refine-truth', action='store_true',
         help='refine the truth by ICP, kept in OUTPUT/truth.json')
-    add('--strides', type=int, nargs='+', metavar='N', default=(1, 2, 4))
-    add('--max-distance', type=float, metavar='M', default=30.0)
-    add('--sets', default='*', metavar='GLOB', help='names of the sets of matches')
-    add('--inlier', type=float, default=0.6, metavar='M',
+    rare('--strides', type=int, nargs='+', metavar='N', default=(1, 2, 4))
+    rare('--max-distance', type=float, metavar='M', default=30.0)
+    rare('--sets', default='*', metavar='GLOB', help='names of the sets of matches')
+    rare('--inlier', type=float, default=0.6, metavar='M',
         help='of matches from files: 0.1 indoors')
-    add('--scans', type=int, default=120, help='of the built-in world')
+    rare('--scans', type=int, default=120, help='of the built-in world')
     add('--limit', type=int, default=0, metavar='PAIRS', help='evenly spread; 0: all')
     add('--methods', nargs='+', metavar='NAME', help='of the table; default: all that there are')
-    add('--method', action='append', default=[], metavar='MODULE:FUNCTION',
+    rare('--method', action='append', default=[], metavar='MODULE:FUNCTION',
         help='one of your own: takes Matches, returns an Answer')
     add('--raw', action='store_true',
         help='also what registers raw scans: SGOR with all of ours, and KISS-Matcher')
     add('--study', choices=[*studies.STUDIES, ABLATION], default='',
         help='repeat for different numbers of matches, categories or random labels; ablation: '
         'rows 1 to 9 of the paper')
-    add('--values', type=float, nargs='+', help='of the study')
-    add('--front-end', choices=['protocol', 'paper'], default='protocol',
+    rare('--values', type=float, nargs='+', help='of the study')
+    rare('--front-end', choices=['protocol', 'paper'], default='protocol',
         help="who makes the matches: the relatives' voxels and radii, or SgorConfig.paper()")
-    add('--features', type=Path, metavar='FOLDER',
+    rare('--features', type=Path, metavar='FOLDER',
         help='NAME.npz for each scan with points (V, 3) and descriptors (V, D)')
-    add('--seed', type=int, default=0)
+    rare('--seed', type=int, default=0)
     add('--processes', type=int, default=1)
-    add('--dask', default='', metavar='ADDRESS', help='of a scheduler, to run on its workers')
-    add('--output', type=Path, metavar='FOLDER', help='default: out/PROTOCOL')
+    rare('--dask', default='', metavar='ADDRESS', help='of a scheduler, to run on its workers')
+    add('-o', '--output', type=Path, metavar='FOLDER', help='default: out/PROTOCOL')
     return parser
 
 
@@ -120,7 +126,7 @@ def _tables(arguments: Namespace) -> int:
                variants=studies.variants(study, arguments.values, arguments.seed),
                processes=arguments.processes, dask=arguments.dask, data=_data(arguments))
     inputs.say(page.keep_earlier(output, rows))
-    print(page.write(output, rows, protocol, methods, study, features))
+    show(page.write(output, rows, protocol, methods, study, features))
     return command_line.OK
 
 

@@ -5,13 +5,13 @@ import shutil
 
 import numpy as np
 from numpy.typing import NDArray
-from tqdm import tqdm
 
 from ..core.common import se3
 from ..core.common.settings import InputError
 from ..io.bags import BagWriter
 from ..io.messages import odometry_of
 from ..io.messages import point_cloud2
+from ..io.terminal import progress
 
 Array = NDArray[np.float64]
 
@@ -67,9 +67,8 @@ def write_world_bag(path: Path, scans: int, seed: int, place: str = STREET
     speed = SPEED_M_S if place == STREET else None
     drive = simulate(scans, seed, speed=speed, place=place,
                      back=place == STREET and scans >= THERE_AND_BACK)
-    with BagWriter(path) as bag:
-        for seconds, points, labels, pose in tqdm(drive, 'recording', scans, unit='scan',
-                                                  disable=None):
+    with BagWriter(path) as bag, progress('recording', scans, 'scan') as told:
+        for seconds, points, labels, pose in told.over(drive):
             stamp_ns = FIRST_STAMP_NS + round(seconds * 1e9)
             bag.write('points', point_cloud2(bag.types, points, labels, stamp_ns, 'lidar'),
                       stamp_ns)

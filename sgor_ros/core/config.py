@@ -40,16 +40,16 @@ class SgorConfig(Ablation):
         'semantickitti', 'What the label ids mean: semantickitti, semantickitti_train, nuscenes, '
         'nuscenes16, autoware_frnet, autoware_ptv3, carla, rellis or the path of a TOML, '
         'JSON or YAML file',
-        group='sensor')
+        group='sensor', common=True)
     min_range: float = setting(
         1.0, 'Points nearer to the sensor are dropped', 'm', minimum=0.0, maximum=100.0,
         group='sensor')
     max_range: float = setting(
         80.0, 'Points farther from the sensor are dropped', 'm', minimum=0.5, maximum=1000.0,
-        group='sensor')
+        group='sensor', common=True)
     voxel_size: float = setting(
         0.5, 'Edge of the voxel grid that thins a scan', 'm', minimum=0.01, maximum=10.0,
-        group='sensor')
+        group='sensor', common=True)
     sigma_g: float = setting(
         0.25, 'Points nearer to the ground plane are ground', 'm', minimum=0.005, maximum=5.0,
         group='thresholds')
@@ -65,7 +65,7 @@ class SgorConfig(Ablation):
     min_confidence: float = setting(
         0.85, 'Results that are right with less probability are failures: at 0.85 a wrong one '
         'costs what six right ones are worth; 0: accept all',
-        minimum=0.0, maximum=1.0, group='trust')
+        minimum=0.0, maximum=1.0, group='trust', common=True)
     hypothesis_radius: float = setting(
         30.0, 'Other placements that explain the scans are looked for so far from the answer; 0: '
         'not at all (beyond the paper)', 'm', minimum=0.0, maximum=500.0, group='trust')
@@ -75,7 +75,8 @@ class SgorConfig(Ablation):
     max_voxels: int = setting(
         40000, 'Voxels of a scan; more are thinned evenly, so that any cloud ends in time',
         minimum=100, maximum=1000000, group='speed')
-    threads: int = setting(2, 'Processor cores to use', minimum=1, maximum=64, group='speed')
+    threads: int = setting(
+        2, 'Processor cores to use', minimum=1, maximum=64, group='speed', common=True)
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -5,11 +5,11 @@ import time
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
-from tqdm import tqdm
 
 from ..core.common import se3
 from ..core.config import SgorConfig
 from ..io.datasets import Drive
+from ..io.terminal import progress
 from ..mapping import Loop
 from ..mapping import Mapper
 from ..mapping import MapperConfig
@@ -82,8 +82,9 @@ def run_loops(drive: Drive, config: SgorConfig, mapper_config: MapperConfig | No
     mapper = Mapper(config, None, mapper_config)
     loops: list[Loop] = []
     stamps_ns = [scan.stamp_ns for scan in drive]
-    for scan in tqdm(drive, drive.name, len(drive), unit='scan', disable=None):
-        loops += mapper.track(scan.read(), scan.stamp_ns).loops
+    with progress(drive.name, len(drive), 'scan') as told:
+        for scan in told.over(drive):
+            loops += mapper.track(scan.read(), scan.stamp_ns).loops
     loops += mapper.finish()
     seconds = time.process_time() - begin
     truth = dict(zip(stamps_ns, drive.T_world_sensor, strict=True))

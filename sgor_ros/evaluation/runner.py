@@ -13,10 +13,10 @@ import json
 from pathlib import Path
 
 import numpy as np
-from tqdm import tqdm
 
 from ..core.common.settings import InputError
 from ..io.executors import executor
+from ..io.terminal import progress
 from .front_end import Features
 from .job import Job
 from .methods import Method
@@ -29,17 +29,21 @@ from .protocols.protocol import Protocol
 from .protocols.studies import Variant
 
 
-def run_pairs(pairs: Sequence[Pair], methods: Sequence[Method], seed: int) -> list[Row]:
-    """Run methods on raw scans whose sources are turned, after a run of each to warm up."""
+def run_pairs(pairs: Sequence[Pair], methods: Sequence[Method], seed: int,
+              kept: list[Row] | None = None) -> list[Row]:
+    """Run methods on raw scans whose sources are turned, after a run of each to warm up.
+
+    `kept` gets the rows as they are done.
+    """
     protocol = outdoor('pairs', pairs)
     Job(replace(protocol, pairs=pairs[:1]), Variant(), methods, turn_seed=seed)()
-    return run(protocol, methods, turn_seed=seed)
+    return run(protocol, methods, turn_seed=seed, kept=kept)
 
 
 def run(protocol: Protocol, methods: Sequence[Method], folder: Path | None = None, *,
         variants: Sequence[Variant] = (Variant(),), features: Features | None = None,
         turn_seed: int | None = None, processes: int = 1, dask: str = '',
-        data: str = '') -> list[Row]:
+        data: str = '', kept: list[Row] | None = None) -> list[Row]:
     """Run all methods on all pairs, in an order that changes from pair to pair.
 
     Parameters
@@ -61,6 +65,8 @@ def run(protocol: Protocol, methods: Sequence[Method], folder: Path | None = Non
         Address of a scheduler, to run on its workers instead.
     data : str
         What the pairs are of: rows of other data are not taken for theirs.
+    kept : list of Row, optional
+        Gets the rows as they are done, for who is stopped before the end.
 
     Returns
     -------
@@ -91,13 +97,15 @@ def run(protocol: Protocol, methods: Sequence[Method], folder: Path | None = Non
                 jobs.append(Job(replace(protocol, pairs=[pair]), variant, missing, features,
                                 None if turn_seed is None else turn_seed + index))
     with (nullcontext() if path is None else path.open('a') as file,
-          tqdm(total=len(jobs), desc=protocol.name, unit='pair', disable=None) as bar):
+          progress(protocol.name, len(jobs), 'pair') as told):
         for rows in _completed(jobs, processes, dask):
             if file is not None:
                 file.write(table.lines(rows))
                 file.flush()
             done |= _by_key(rows)
-            bar.update()
+            if kept is not None:
+                kept += rows
+            told.step()
     if path is not None:
         done = _by_key(table.read(path, protocol.thresholds[0]))
     return [done[variant.name, pair.name, method.name] for variant in variants

@@ -6,11 +6,11 @@ import time
 
 import numpy as np
 from numpy.typing import NDArray
-from tqdm import tqdm
 
 from ..core.config import SgorConfig
 from ..core.warmup import warm_up
 from ..io.datasets import Drive
+from ..io.terminal import progress
 from .methods.odometries import Step
 from .methods.odometries import TrackerOdometry
 from .metrics.consistency import ScanConsistency
@@ -71,13 +71,15 @@ def run_drive(drive: Drive, makers: dict[str, Callable[[], Step]], config: SgorC
     poses: dict[str, list[Array | None]] = {name: [] for name in makers}
     seconds: dict[str, list[tuple[float, float]]] = {name: [] for name in makers}
     rng = np.random.default_rng(0)
-    for frame in tqdm(drive.scans, drive.name, unit='scan', disable=None):
-        scan = frame.read()
-        for name in rng.permutation(list(makers)):
-            start, cpu_start = time.perf_counter(), time.process_time()
-            T = odometry[name](scan)
-            seconds[name].append((time.perf_counter() - start, time.process_time() - cpu_start))
-            poses[name].append(T)
+    with progress(drive.name, len(drive.scans), 'scan') as told:
+        for frame in told.over(drive.scans):
+            scan = frame.read()
+            for name in rng.permutation(list(makers)):
+                start, cpu_start = time.perf_counter(), time.process_time()
+                T = odometry[name](scan)
+                seconds[name].append((time.perf_counter() - start,
+                                      time.process_time() - cpu_start))
+                poses[name].append(T)
     return [_track(name, drive.name, poses[name], truth, seconds[name], odometry[name])
             for name in makers]
 

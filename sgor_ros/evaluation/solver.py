@@ -13,7 +13,6 @@ import time
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
-from tqdm import tqdm
 
 from ..core.common import se3
 from ..core.config import SgorConfig
@@ -21,6 +20,7 @@ from ..core.matching.correspondences import match
 from ..core.preprocessing import preprocess
 from ..core.scan.scan import SemanticScan
 from ..core.solver.graph import consistency_graph
+from ..io.terminal import progress
 from . import dense_reference
 from .methods import Answer
 from .methods import Matches
@@ -91,13 +91,14 @@ def fpfh_matches(pairs: Sequence[Pair], count: int) -> Iterator[Pair]:
     """Yield up to `count` matches of each pair: nearest FPFH, as the paper has it, no labels."""
     config = SgorConfig.paper().replace(voxel_size=FINE_VOXEL_M, semantics='none',
                                         max_correspondences=count)
-    for pair in tqdm(pairs, 'matching', unit='pair', disable=None):
-        source, target = (preprocess(SemanticScan(frame.read().points), config).features
-                          for frame in pair.scans)
-        found = match(source, target, config)
-        assert pair.T_target_source is not None
-        yield _pair(f'{pair.data_set}, {pair.distance_m:.0f} m', found.source, found.target,
-                    pair.T_target_source)
+    with progress('matching', len(pairs), 'pair') as told:
+        for pair in told.over(pairs):
+            source, target = (preprocess(SemanticScan(frame.read().points), config).features
+                              for frame in pair.scans)
+            found = match(source, target, config)
+            assert pair.T_target_source is not None
+            yield _pair(f'{pair.data_set}, {pair.distance_m:.0f} m', found.source, found.target,
+                        pair.T_target_source)
 
 
 def _pair(name: str, source: Array, target: Array, T_target_source: Array) -> Pair:
@@ -113,8 +114,8 @@ def run_solver(sets: Sequence[Pair], config: SgorConfig, runs: int, others: Sequ
     if config.threads > 1:
         configs |= {f'{name}, one thread': c.replace(threads=1) for name, c in configs.items()}
     solvers = [*(sgor_on_matches(name, c) for name, c in configs.items()), *others]
-    return [row for pair in tqdm(sets, unit='set', disable=None)
-            for row in _timed(pair, solvers, runs, config)]
+    with progress('solvers', len(sets), 'set') as told:
+        return [row for pair in told.over(sets) for row in _timed(pair, solvers, runs, config)]
 
 
 def run_dense(sets: Sequence[Pair]) -> list[Solved]:
@@ -123,8 +124,9 @@ def run_dense(sets: Sequence[Pair]) -> list[Solved]:
     sparse = sgor_on_matches(f'SGOR, {DENSE_GROUPS} groups', config)
     _answer(sparse, sets[0])
     dense = Method(f'dense numpy, {DENSE_GROUPS} groups', on_matches=partial(_dense, config))
-    return [row for pair in tqdm(sets, 'dense', unit='set', disable=None)
-            for row in _timed(pair, (dense, sparse), 1, config)]
+    with progress('dense', len(sets), 'set') as told:
+        return [row for pair in told.over(sets)
+                for row in _timed(pair, (dense, sparse), 1, config)]
 
 
 def _dense(config: SgorConfig, matches: Matches) -> Answer:

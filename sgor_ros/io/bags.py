@@ -27,6 +27,7 @@ from .header_stamp import stamp_ns_of
 from .label_field import field_names
 from .label_field import label_field_of
 from .messages import matrix_of
+from .messages import matrix_of_transform
 from .writing import new_folder
 from .writing import refuse_existing
 
@@ -40,7 +41,12 @@ MENDS = {'.mcap': 'mcap recover', '.bag': 'rosbag reindex', '.db3': 'ros2 bag re
          '': 'ros2 bag reindex (or mcap recover, for its .mcap)'}
 KNOWN = get_typestore(Stores.ROS2_JAZZY)
 CLOUD_TYPE = 'sensor_msgs/msg/PointCloud2'
-ODOMETRY_TYPE = 'nav_msgs/msg/Odometry'
+POSES: dict[str, Callable[[Any], NDArray[np.float64]]] = {
+    'nav_msgs/msg/Odometry': lambda message: matrix_of(message.pose.pose),
+    'geometry_msgs/msg/PoseStamped': lambda message: matrix_of(message.pose),
+    'geometry_msgs/msg/PoseWithCovarianceStamped': lambda message: matrix_of(message.pose.pose),
+    'geometry_msgs/msg/TransformStamped': lambda message: matrix_of_transform(message.transform)}
+"""Types of messages with a stamp and a pose."""
 BAG_FILES = ('.mcap', '.db3', '.bag')
 
 ZSTD = b'\x28\xb5\x2f\xfd'
@@ -188,13 +194,46 @@ class BagReader:
                               if c.topic == topic and c.msgtype == CLOUD_TYPE], at_ns)
 
     def poses(self, topic: str) -> Iterator[tuple[int, NDArray[np.float64]]]:
-        """Iterate over the odometry of a topic, if there is any: stamp, (4, 4) pose."""
+        """Iterate over the poses of a topic, if there are any: stamp, (4, 4) pose."""
         connections = [c for c in self._reader.connections
-                       if c.topic == topic and c.msgtype == ODOMETRY_TYPE]
+                       if c.topic == topic and c.msgtype in POSES]
         with self._readable():
-            for _, _, raw in self._reader.messages(connections) if connections else ():
-                message: Any = self._reader.deserialize(raw, ODOMETRY_TYPE)
-                yield stamp_ns_of(message.header), matrix_of(message.pose.pose)
+            for connection, _, raw in self._reader.messages(connections) if connections else ():
+                message: Any = self._reader.deserialize(raw, connection.msgtype)
+                yield stamp_ns_of(message.header), POSES[connection.msgtype](message)
+
+    def timed_poses(self, topic: str) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """Return the poses of a topic in the order of their stamps, one for each stamp.
+
+        Parameters
+        ----------
+        topic : str
+            Of odometry, or of stamped poses or transforms.
+
+        Returns
+        -------
+        stamps_ns : (N,) int64
+            Nanoseconds, increasing.
+        poses : (N, 4, 4) float64
+
+        Raises
+        ------
+        InputError
+            No such topic of poses, none on it, or one that is not finite.
+        """
+        known = sorted({c.topic for c in self._reader.connections if c.msgtype in POSES})
+        if topic not in known:
+            raise InputError(f'topic {topic}: no poses in {self.path}; there are '
+                             f'{", ".join(known) or "none"}')
+        found = dict(self.poses(topic))
+        if not found:
+            raise InputError(f'topic {topic}: no message on it in {self.path}')
+        for stamp_ns, T in found.items():
+            if not np.isfinite(T).all():
+                raise InputError(f'topic {topic}: the pose at {stamp_ns * 1e-9:.3f} s is not '
+                                 'finite')
+        stamps_ns = sorted(found)
+        return np.array(stamps_ns, np.int64), np.array([found[stamp] for stamp in stamps_ns])
 
     def _iterate(self, connections: list[Connection], at_ns: int | None
                  ) -> Iterator[RecordedCloud]:

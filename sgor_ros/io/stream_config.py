@@ -16,7 +16,7 @@ class StreamConfig(Settings):
 
     label_field: str = setting(
         AUTO, 'Field of the clouds that holds the class ids; auto: the first of '
-        f'{", ".join(LABEL_FIELDS)} that a cloud has; none: work without labels')
+        f'{", ".join(LABEL_FIELDS)} that a cloud has; none: work without labels', common=True)
     time_field: str = setting(
         AUTO, 'Field of the clouds with the time of each point, by which scans are deskewed; '
         f'auto: the first of {", ".join(TIME_FIELDS)} that a cloud has; none: for clouds that are '
@@ -28,11 +28,12 @@ class StreamConfig(Settings):
     sensor_frame: str = setting(
         '', 'Frame of the sensor in what is published; empty: the frame_id of each scan')
     base_frame: str = setting(
-        '', 'Frame whose odometry is published, such as base_link; empty: the frame of the sensor')
+        '', 'Frame whose odometry is published, such as base_link; empty: the frame of the sensor',
+        common=True)
     T_base_sensor: str = setting(
         '', 'Pose of the sensor in base_frame, x y z roll pitch yaw as in a URDF, m and rad; '
         'empty: the node looks it up in tf2 at the stamp of each scan. It tells which way is up; '
-        'and where the sensor is in clouds that lie in base_frame already')
+        'and where the sensor is in clouds that lie in base_frame already', common=True)
 
     def __post_init__(self) -> None:
         """Check the frames too."""

@@ -116,7 +116,8 @@ def read_timed_poses(path: str | Path) -> tuple[NDArray[np.int64] | None, NDArra
 
 
 def _nanoseconds(path: str | Path) -> NDArray[np.int64]:
-    first = (line.split('#')[0].split() for line in Path(path).read_text().splitlines())
+    # lines as numpy has them: splitlines also ends them at form feeds and the like
+    first = (line.split('#')[0].split() for line in Path(path).read_text().split('\n'))
     return np.array([int(Decimal(words[0]) * 10**9) for words in first if words], np.int64)
 
 

@@ -43,11 +43,12 @@ def new_file(path: str | Path) -> Iterator[Path]:
 
 
 @contextmanager
-def new_folder(path: str | Path) -> Iterator[Path]:
+def new_folder(path: str | Path, part: bool = False) -> Iterator[Path]:
     """Yield where to make a folder that becomes `path` at the end of the ``with``.
 
     That place has the name of `path`, for some formats repeat it inside, and lies in a folder
-    that is cleared when the ``with`` ends or, after a kill, by the next run.
+    that is cleared when the ``with`` ends or, after a kill, by the next run. With `part` what was
+    made becomes `path` too where the ``with`` ends by an exception.
 
     Raises
     ------
@@ -57,7 +58,12 @@ def new_folder(path: str | Path) -> Iterator[Path]:
     path = Path(path)
     refuse_existing(path)
     with _place_beside(path) as place:
-        yield place
+        try:
+            yield place
+        except BaseException:
+            if part and place.is_dir():
+                place.rename(path)
+            raise
         place.rename(path)
 
 

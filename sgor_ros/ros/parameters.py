@@ -4,8 +4,11 @@
 it writes that file and the presets there.
 """
 from collections.abc import Iterable
+from collections.abc import Mapping
 from dataclasses import asdict
 from dataclasses import dataclass
+from dataclasses import replace
+from itertools import chain
 import math
 from pathlib import Path
 import sys
@@ -45,17 +48,17 @@ class NodeConfig(StreamConfig):
         'publisher turns up that is best effort only', choices=('auto', 'reliable', 'best_effort'))
     loop_closure: bool = setting(
         False, 'Close loops: publish loop_closure, path and map_cloud, and with publish_tf the '
-        'transform from map_frame to odom_frame; needs GTSAM')
+        'transform from map_frame to odom_frame; needs GTSAM', common=True)
     map_folder: str = setting(
         '', 'Folder of the map, for the services save_map and load_map; it can be changed while '
         'the node runs. A map that is there when the node starts is gone on in: the sensor is '
-        'looked for in it, and map_frame is its frame. Needs loop_closure')
+        'looked for in it, and map_frame is its frame. Needs loop_closure', common=True)
     localization: bool = setting(
         False, 'Follow the map of map_folder and add nothing to it, until the service '
-        'set_mode_mapping is called')
+        'set_mode_mapping is called', common=True)
     publish_tf: bool = setting(
         False, 'Publish the transform from odom_frame to base_frame, or to the sensor frame, on '
-        '/tf')
+        '/tf', common=True)
     invert_tf: bool = setting(
         False, 'Publish it as a transform to odom_frame: for a base that has a parent already')
 
@@ -162,23 +165,32 @@ def _warn_of_unknown(node: Node) -> None:
             node.get_logger().warning(f'parameter {name}: there is none of that name; ignored')
 
 
+SECTIONS: dict[str, type[Settings]] = {
+    'Registration; these can be changed while the node runs': SgorConfig,
+    'Tracker; these can be changed while the node runs': TrackerConfig,
+    'Loops; read when it starts': MapperConfig,
+    'Node; read when it starts': NodeConfig}
+THE_REST = 'The rest: the defaults serve'
+
+
 def yaml_files() -> dict[str, str]:
     """Return the parameter files of config/: name to content."""
     indoor = _differences(SgorConfig.indoor())
     consecutive = _differences(TrackerConfig(mode='consecutive'))
     return {
         'sgor_node.yaml': _yaml(
-            'All parameters of sgor_node with their defaults.',
-            ('Registration; these can be changed while the node runs', SgorConfig.shown(), {}),
-            ('Tracker; these can be changed while the node runs', TrackerConfig.shown(), {}),
-            ('Loops; read when it starts', MapperConfig.shown(), {}),
-            ('Node; read when it starts', NodeConfig.shown(), {})),
+            'All parameters of sgor_node with their defaults: what many change, then the rest.',
+            *(_section(heading, [replace(item, group='') for item in config.common()])
+              for heading, config in SECTIONS.items()),
+            ['', f'    # ======== {THE_REST} ========'],
+            *(_section(heading, [item for item in config.shown() if not item.common])
+              for heading, config in SECTIONS.items())),
         'indoor.yaml': _yaml(
             'Deprecated: the defaults find the scale of a room, and register more scans of it.',
-            ('SgorConfig.indoor()', _named(SgorConfig, indoor), indoor)),
+            _section('SgorConfig.indoor()', _named(SgorConfig, indoor), indoor)),
         'consecutive.yaml': _yaml(
             'Register each scan to the one before: what differs from the defaults.',
-            ('Tracker', _named(TrackerConfig, consecutive), consecutive))}
+            _section('Tracker', _named(TrackerConfig, consecutive), consecutive))}
 
 
 def _differences(config: Settings) -> dict[str, Value]:
@@ -190,21 +202,24 @@ def _named(config: type[Settings], names: Iterable[str]) -> list[Setting]:
     return [item for item in config.settings() if item.name in names]
 
 
-def _yaml(title: str, *sections: tuple[str, Iterable[Setting], dict[str, Value]]) -> str:
-    lines = [f'# {title}',
-             '# Made by `python -m sgor_ros.ros.parameters config`. Doubles need their point: '
-             '3.0, not 3.',
-             '/**:', '  ros__parameters:']
-    for heading, settings, values in sections:
-        group = None
-        for item in settings:
-            if item.group != group:
-                group = item.group
-                lines += ['', f'    # ---- {heading}{group and f": {group}"} ----']
-            lines += textwrap.wrap(item.description + _bounds(item), 99, initial_indent='    # ',
-                                   subsequent_indent='    # ')
-            lines.append(f'    {item.name}: {_scalar(values.get(item.name, item.default))}')
-    return '\n'.join(lines) + '\n'
+def _yaml(title: str, *sections: list[str]) -> str:
+    return '\n'.join((
+        f'# {title}', '# Made by `python -m sgor_ros.ros.parameters config`. Doubles need their '
+        'point: 3.0, not 3.', '/**:', '  ros__parameters:', *chain(*sections))) + '\n'
+
+
+def _section(heading: str, settings: Iterable[Setting], values: Mapping[str, Value] | None = None
+             ) -> list[str]:
+    lines: list[str] = []
+    group = None
+    for item in settings:
+        if item.group != group:
+            group = item.group
+            lines += ['', f'    # ---- {heading}{group and f": {group}"} ----']
+        lines += textwrap.wrap(item.description + _bounds(item), 99, initial_indent='    # ',
+                               subsequent_indent='    # ')
+        lines.append(f'    {item.name}: {_scalar((values or {}).get(item.name, item.default))}')
+    return lines
 
 
 def _bounds(item: Setting) -> str:

@@ -44,7 +44,7 @@ class TrackerConfig(TrackerAblation):
 
     mode: str = setting(
         'keyframe', 'Register to the scan before, or to the last keyframe',
-        choices=('consecutive', 'keyframe'), group='keyframes')
+        choices=('consecutive', 'keyframe'), group='keyframes', common=True)
     keyframe_distance: float = setting(
         5.0, 'A scan farther from its keyframe becomes the next', 'm', minimum=0.1, maximum=100.0,
         group='keyframes')

@@ -2,7 +2,9 @@
 from argparse import Namespace
 from contextlib import suppress
 from importlib import import_module
+import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -11,10 +13,14 @@ import time
 import numpy as np
 import pytest
 
+from sgor_ros import MapperConfig
+from sgor_ros import SgorConfig
+from sgor_ros import TrackerConfig
 from sgor_ros import warm_up
 from sgor_ros.commands.command_line import AGAIN_S
 from sgor_ros.commands.command_line import CODES
 from sgor_ros.commands.command_line import run
+from sgor_ros.io.stream_config import StreamConfig
 
 MODULES = {'sgor_register': 'commands.register', 'sgor_replay': 'commands.replay',
            'sgor_kitti_to_bag': 'commands.kitti_to_bag', 'sgor_benchmark': 'commands.benchmark',
@@ -72,6 +78,72 @@ def test_defaults_that_say_something_are_told(capsys):
     said = ' '.join(capsys.readouterr().out.split())
     assert 'chooses pairs, turns and noise (default: 0)' in said
     assert 'of made-up matches (default: 0.02)' in said
+
+
+@pytest.mark.parametrize(('command', 'config'), [
+    (('sgor_register',), [SgorConfig]), (('sgor_tables',), []),
+    *((each, [SgorConfig, TrackerConfig, MapperConfig, StreamConfig])
+      for each in (('sgor_replay',), ('sgor_map', 'build')))], ids=str)
+def test_help_is_short_and_help_all_tells_the_rest(command, config, capsys):
+    assert ended(*command, '--help') == 0
+    short = capsys.readouterr().out
+    assert ended(*command, '--help-all') == 0
+    full = capsys.readouterr().out
+    assert len(short.splitlines()) < 90
+    told = {each: set(re.findall(r'--[\w-]+', text.partition('examples:')[0]))
+            for each, text in (('short', short), ('full', full))}
+    assert told['short'] < told['full']
+    for item in (item for each in config for item in each.settings()):
+        option = f'--{item.name.replace("_", "-")}'
+        assert option in told['full']
+        assert (option in told['short']) == item.common
+
+
+@pytest.mark.parametrize(('short', 'option', 'commands'), [
+    ('-o', '--output', ['sgor_replay', 'sgor_tables', 'sgor_demo', 'sgor_benchmark pairs',
+                        'sgor_map build', 'sgor_map merge', 'sgor_map show']),
+    ('-v', '--visualize', ['sgor_replay', 'sgor_register']),
+    ('-t', '--topic', ['sgor_replay', 'sgor_map build']),
+    ('-j', '--json', ['sgor_register', 'sgor_map locate']),
+    ('-p', '--plot', ['sgor_register']),
+    ('-V', '--version', [' '.join(command) for command in COMMANDS])])
+def test_short_options(short, option, commands, capsys):
+    for command in commands:
+        assert ended(*command.split(), '--help') == 0
+        assert re.search(rf'{short}\b.*, {option}\b', capsys.readouterr().out), command
+
+
+SGOR = [sys.executable, '-c',
+        'import sys; from sgor_ros.commands.entry import sgor; sys.exit(sgor())']
+
+
+def test_sgor_is_all_commands(pair):
+    said = ran(*SGOR, '--help')
+    assert said.returncode == 0
+    listed = set(re.findall(r'^    ([\w-]+)', said.stdout, re.MULTILINE))
+    assert {f'sgor_{name.replace("-", "_")}' for name in listed} == set(MODULES)
+    for name in listed:
+        said = ran(*SGOR, name, '--help')
+        assert said.returncode == 0, said.stderr
+        assert said.stdout.startswith(f'usage: sgor_{name.replace("-", "_")} ')
+    by_old_name = ran(*line('sgor_register', *pair, '--json', '-'))
+    said = ran(*SGOR, 'register', *map(str, pair), '-j', '-')
+    assert said.returncode == 0
+    one, other = (json.loads(each.stdout)['T_target_source'] for each in (said, by_old_name))
+    assert one == other
+    assert ran(*SGOR, 'kitti_to_bag').stderr.endswith(
+        'usage: sgor_kitti_to_bag SEQUENCE OUT [options]; sgor_kitti_to_bag --help tells more\n')
+
+
+def test_sgor_answers_a_slip_and_loads_no_command_for_its_help():
+    said = ran(*SGOR, 'nonsense')
+    assert said.returncode == 2
+    assert said.stderr.startswith("error: argument COMMAND: invalid choice: 'nonsense'")
+    assert ran(*SGOR).returncode == 2
+    loaded = ran(sys.executable, '-c', 'import sys\nfrom sgor_ros.commands.entry import sgor\n'
+                 'sys.argv[1:] = ["--help"]\ntry: sgor()\n'
+                 'except SystemExit: print("scipy" in sys.modules, "numba" in sys.modules)')
+    assert loaded.stdout.endswith('\nFalse False\n')
 
 
 @pytest.mark.parametrize('command', COMMANDS, ids=' '.join)

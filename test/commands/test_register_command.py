@@ -162,7 +162,13 @@ def test_settings_for_studies_and_names_of_before_are_taken_and_not_shown(pair, 
     shown = capsys.readouterr().out
     for name in ('ground-check', 'groups', 'quick-keypoints', 'rival-radius'):
         assert f'--{name}' not in shown
-    assert '--hypothesis-radius' in shown
+    assert '--hypothesis-radius' not in shown
+    with pytest.raises(SystemExit):
+        main(['--help-all'])
+    shown = capsys.readouterr().out
+    for name in ('ground-check', 'groups', 'quick-keypoints', 'hypothesis-radius'):
+        assert f'--{name}' in shown
+    assert '--rival-radius' not in shown
     file = tmp_path / 'params.yaml'
     file.write_text('/**:\n  ros__parameters:\n    group_keep: 3\n    group_size: 3\n')
     assert main([*pair[:2], '--params-file', str(file)]) == 2
@@ -175,7 +181,7 @@ def test_settings_for_studies_and_names_of_before_are_taken_and_not_shown(pair, 
 
 def test_help_tells_units_bounds_and_defaults(capsys):
     with pytest.raises(SystemExit, match='0'):
-        main(['--help'])
+        main(['--help-all'])
     said = ' '.join(capsys.readouterr().out.split())
     assert ('--sigma-d m Two correspondences are consistent when their lengths differ by less '
             f'[m]; at least 0.005, at most 5, default {SgorConfig().sigma_d:g}') in said

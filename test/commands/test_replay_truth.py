@@ -10,7 +10,11 @@ from scipy.spatial.transform import Rotation
 
 from sgor_ros import InputError
 from sgor_ros.commands.replay import main
+from sgor_ros.io.bags import BagWriter
 from sgor_ros.io.frames import parse_transform
+from sgor_ros.io.messages import odometry_of
+from sgor_ros.io.messages import point_cloud2
+from sgor_ros.io.messages import transform_stamped
 from sgor_ros.io.trajectories import read_kitti
 from sgor_ros.io.trajectories import read_timed_poses
 from sgor_ros.io.trajectories import write_kitti
@@ -117,3 +121,60 @@ def test_stamps_of_tum_are_exact(tmp_path):
     np.testing.assert_array_equal(poses[0, :3, 3], [1, 2, 3])
     with pytest.raises(InputError, match=r'no such|cannot be read'):
         read_timed_poses(tmp_path / 'nowhere')
+
+
+def test_lines_end_where_numpy_ends_them(tmp_path):
+    (tmp_path / 'a.tum').write_text('1.5 1 2\x0c3 0 0 0 1\n2.5 1 2 3 0 0 0 1\n')
+    stamps_ns, poses = read_timed_poses(tmp_path / 'a.tum')
+    assert stamps_ns.tolist() == [1_500_000_000, 2_500_000_000]
+    assert len(poses) == 2
+
+
+def pose_messages(types, kind, stamp_ns, T):
+    """Return a message with a pose, of any of the types that serve as truth."""
+    odometry = odometry_of(types, T, stamp_ns, 'map', 'lidar')
+    if kind == 'Odometry':
+        return odometry
+    if kind == 'TransformStamped':
+        return transform_stamped(types, T, stamp_ns, 'map', 'lidar')
+    return types(f'geometry_msgs/msg/{kind}')(
+        header=odometry.header,
+        pose=odometry.pose if kind == 'PoseWithCovarianceStamped' else odometry.pose.pose)
+
+
+@pytest.mark.parametrize('kind', ['Odometry', 'PoseStamped', 'PoseWithCovarianceStamped',
+                                  'TransformStamped'])
+def test_truth_on_a_topic_of_the_bag(street, tmp_path, kind, capsys):
+    with BagWriter(tmp_path / 'bag') as bag:
+        for i, (points, labels, T) in enumerate(street):
+            stamp_ns = i * PERIOD_NS
+            bag.write('/points', point_cloud2(bag.types, points, labels, stamp_ns, 'lidar'),
+                      stamp_ns)
+            # a little off in time, as of another computer; and more often
+            for late, pose in ((4_000_000, T_MAP_WORLD @ T), (50_000_000, np.eye(4))):
+                bag.write('/mocap/lidar', pose_messages(bag.types, kind, stamp_ns + late, pose),
+                          stamp_ns + late)
+    out = tmp_path / 'out'
+    assert main([str(tmp_path / 'bag'), '-o', str(out), '--truth', '/mocap/lidar']) == 0
+    error, = summary(out)['truth']
+    ape, rpe = by_hand(out, street)
+    assert (error['poses'], error['ape_rmse_m']) == (4, pytest.approx(ape, abs=1e-4))
+    assert error['rpe_translation_rmse_m'] == pytest.approx(rpe, abs=1e-4)
+    assert main([str(tmp_path / 'bag'), '-o', str(tmp_path / 'b'), '--truth', '/gps']) == 2
+    assert 'topic /gps: no poses in' in (said := capsys.readouterr().err)
+    assert 'there are /mocap/lidar' in said
+
+
+@pytest.mark.parametrize(('change', 'says'), [
+    ({'x': np.nan}, 'topic /truth: the pose at 0.000 s is not finite'), ({'w': 0.0}, 'norm')])
+def test_poses_of_a_topic_that_are_none(street, tmp_path, capsys, change, says):
+    with BagWriter(tmp_path / 'bag') as bag:
+        bag.write('/points', point_cloud2(bag.types, *street[0][:2], 0, 'lidar'), 0)
+        message = pose_messages(bag.types, 'PoseStamped', 0, np.eye(4))
+        for name, value in change.items():
+            setattr(message.pose.position if name == 'x' else message.pose.orientation, name,
+                    value)
+        bag.write('/truth', message, 0)
+    assert main([str(tmp_path / 'bag'), '-o', str(tmp_path / 'out'), '--truth', '/truth']) == 2
+    assert says in capsys.readouterr().err
+    assert not (tmp_path / 'out').exists()

@@ -36,5 +36,5 @@ def test_the_library_registers_without_evaluation(tmp_path):
                    'found = sgor_ros.register_correspondences(points, points + (1, 2, 3))\n'
                    'print(found.T_target_source[:3, 3].round(3).tolist(),\n'
                    '      [name for name in sys.modules if name.startswith("sgor_ros.eval")])',
-                   tmp_path, 'evo', 'open3d', 'matplotlib', 'tqdm', 'rosbags', 'igraph')
+                   tmp_path, 'evo', 'open3d', 'matplotlib', 'rich', 'rosbags', 'igraph')
     assert done.stdout == '[1.0, 2.0, 3.0] []\n', done.stderr

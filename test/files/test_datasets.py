@@ -371,6 +371,34 @@ def test_what_is_broken_is_named(street, tmp_path, what):
         open_drive(path)
 
 
+@pytest.mark.parametrize('layout', ['semantickitti', 'scans'])
+@pytest.mark.parametrize('where', ['beside', 'elsewhere'])
+def test_a_folder_of_labels_by_name(street, tmp_path, monkeypatch, layout, where):
+    folder = WRITERS[layout](tmp_path / 'data', street)
+    scans = [scan.name.rpartition('/')[2] for scan in open_drive(folder).scans]
+    monkeypatch.chdir(tmp_path)
+    chosen = folder / 'net' if where == 'beside' else tmp_path / 'net'
+    chosen.mkdir()
+    for name, (_, labels, _) in zip(scans, street, strict=True):
+        write_labels(chosen / f'{name}.label', labels // 2)
+    drive = open_drive(folder, labels='net')
+    for index, (_, labels, _) in enumerate(street):
+        np.testing.assert_array_equal(drive.read(index).labels, labels // 2)
+    (chosen / f'{scans[2]}.label').unlink()
+    with pytest.raises(InputError, match=f'no labels for 1 of 4 scans, the first is {scans[2]}'):
+        open_drive(folder, labels='net')
+    with pytest.raises(InputError, match='nowhere: no such folder'):
+        open_drive(folder, labels='nowhere')
+
+
+def test_a_layout_with_labels_of_its_own_takes_no_other_folder(street, street_bag, tmp_path):
+    folder = WRITERS['rellis'](tmp_path / 'data', street)
+    with pytest.raises(InputError, match=r'labels net: .* has its own, in the layout of rellis'):
+        open_drive(folder, labels='net')
+    with pytest.raises(InputError, match='labels net: the clouds of a bag'):
+        open_drive(street_bag, labels='net')
+
+
 def test_labels_of_two_conventions_are_no_one_convention(data_folder):
     with pytest.raises(InputError, match=r'several conventions .semantickitti, semantickitti_tr'):
         _ = open_drive(data_folder / 'kitti/00').label_convention

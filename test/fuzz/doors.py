@@ -24,6 +24,7 @@ from sgor_ros.io.scans import read_labels
 from sgor_ros.io.scans import read_scan
 from sgor_ros.io.trajectories import read_calibration
 from sgor_ros.io.trajectories import read_poses
+from sgor_ros.io.trajectories import read_timed_poses
 from sgor_ros.io.trajectories import read_times
 
 
@@ -116,6 +117,14 @@ def _motions(read, path):
     assert np.isfinite(read(path)).all()
 
 
+def _truth(path):
+    stamps_ns, poses = read_timed_poses(path)
+    if stamps_ns is not None:    # in the format of KITTI a pose may be missing
+        assert len(stamps_ns) == len(poses)
+        assert (np.diff(stamps_ns) >= 0).all()
+        assert np.isfinite(poses).all()
+
+
 def _times(path):
     stamps_ns = read_times(path)
     assert all(0 <= stamp_ns < 2**63 for stamp_ns in stamps_ns)
@@ -143,5 +152,6 @@ DOORS = {
                      beside=lambda: {'bag.mcap': seeds.mcaps()[0]}),
     'times': Door('times.txt', seeds.times, _times),
     'poses': Door('poses.txt', seeds.poses, partial(_motions, read_poses)),
+    'truth': Door('truth.tum', seeds.truths, _truth),
     'calib': Door('calib.txt', seeds.calibrations, partial(_motions, read_calibration)),
 }

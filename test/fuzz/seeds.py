@@ -196,6 +196,12 @@ def poses():
     return [b'1 0 0 0 0 1 0 0 0 0 1 0\n0.8 -0.6 0 5 0.6 0.8 0 -2.5e1 0 0 1 0\n' * 4]
 
 
+def truths():
+    return [b'# stamp x y z qx qy qz qw\n' + b''.join(
+        b'%d.%09d %d -2.5e1 0.5 0 0 0.6 0.8\n' % (1691936557 + i, 946849179, i)
+        for i in range(8)), *poses()]
+
+
 def calibrations():
     return [b'P0: 7 0 6 0 0 7 1 0 0 0 1 0\n\nTr: 0 -1 0 0.1 0 0 -1 -0.2 1 0 0 -0.3\n']
 

@@ -167,6 +167,22 @@ def test_the_example_of_the_readme(street, capsys):
     assert 'not to be trusted' in capsys.readouterr().out
 
 
+def test_the_first_page_of_the_site(street):
+    scope = {f'{side}_{what}': street[i][j] for i, side in ((0, 'target'), (3, 'source'))
+             for j, what in enumerate(('points', 'labels'))}
+    exec(code_of('docs/index.md'), scope)
+    metres, degrees = errors(scope['result'].T_target_source,
+                             relative(street[0][2], street[3][2]))
+    assert metres < 0.1
+    assert degrees < 0.3
+
+
+def test_types_of_the_api_are_links(site):
+    links, = (links for path, links in site.items() if path.name == 'api.html')
+    assert {'#sgor_ros.SemanticScan', '#sgor_ros.SgorConfig', '#sgor_ros.PreparedScan',
+            '#sgor_ros.Status', '#sgor_ros.Placement'} <= links.out
+
+
 @pytest.mark.parametrize(('kind', 'seed'), [
     ('courtyard', 1), ('facade', 2), ('facade_cars_regular', 2)])
 def test_each_placement_is_an_edge(kind, seed):

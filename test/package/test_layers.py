@@ -13,7 +13,7 @@ SHELLS = {'io', 'pipeline', 'visualize', 'ros', 'commands', 'evaluation'}
 ROS = {'rclpy', 'ament_index_python', 'launch', 'launch_ros', 'sensor_msgs', 'nav_msgs',
        'geometry_msgs', 'visualization_msgs', 'diagnostic_msgs', 'std_msgs', 'std_srvs',
        'builtin_interfaces', 'rcl_interfaces', 'tf2_msgs', 'tf2_ros'}
-FILES = {'rosbags', 'rerun', 'matplotlib', 'tqdm', 'argparse'}
+FILES = {'rosbags', 'rerun', 'matplotlib', 'rich', 'argparse'}
 
 # module or folder -> what it may import of the package besides itself
 MAY_IMPORT = {

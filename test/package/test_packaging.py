@@ -22,8 +22,8 @@ from sgor_ros.world import Lidar
 from sgor_ros.world import simulate
 
 ROOT = Path(__file__).resolve().parents[2]
-COMMANDS = {'sgor_node', 'sgor_replay', 'sgor_register', 'sgor_kitti_to_bag', 'sgor_benchmark',
-            'sgor_demo', 'sgor_map', 'sgor_tables', 'sgor_warm_up'}
+COMMANDS = {'sgor', 'sgor_node', 'sgor_replay', 'sgor_register', 'sgor_kitti_to_bag',
+            'sgor_benchmark', 'sgor_demo', 'sgor_map', 'sgor_tables', 'sgor_warm_up'}
 SITE = f'lib/python3.{sys.version_info.minor}/site-packages'
 # what a user's package finds out about its own tables
 LABELS = ('import sgor_ros; from sgor_ros.core.scan.labels import label_convention as find;'

@@ -36,7 +36,7 @@ result = register(source, SemanticScan(points, labels))
 assert result.success, result.reason
 assert label_convention('nuscenes').classes and label_convention('carla').classes
 print(np.abs(result.T_target_source[:3] - np.c_[R, t]).max(),
-      not {'yaml', 'matplotlib', 'rosbags', 'tqdm', 'threadpoolctl'} & set(sys.modules),
+      not {'yaml', 'matplotlib', 'rosbags', 'rich', 'threadpoolctl'} & set(sys.modules),
       sys.modules.get('pkg_resources'))
 """
 

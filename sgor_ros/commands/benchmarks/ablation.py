@@ -3,6 +3,7 @@ from argparse import ArgumentParser
 from argparse import Namespace
 from pathlib import Path
 
+from ...evaluation.metrics.row import Row
 from ...evaluation.metrics.row import scan_records
 from ...evaluation.protocols import ablation as ablations
 from ...evaluation.report import plots
@@ -27,7 +28,9 @@ def measure(arguments: Namespace, folder: Path) -> None:
     """Turn the mechanisms off, one at a time, as the paper does and ours too."""
     methods = ablations.methods(arguments.cores, only_paper=arguments.paper)
     right = inputs.right_pairs(arguments, inputs.drives_of(arguments), arguments.pairs)
-    rows = run_pairs(right, methods, arguments.seed)
+    so_far: list[Row] = []
+    with inputs.kept_if_stopped(arguments, folder, so_far):
+        rows = run_pairs(right, methods, arguments.seed, so_far)
     names = [method.name for method in methods]
     counts = {data_set: sum(pair.data_set == data_set for pair in right)
               for data_set in sorted({pair.data_set for pair in right})}

@@ -1,7 +1,9 @@
 """What the benchmarks share: settings, drives, right pairs, and how a table is left."""
 from argparse import ArgumentParser
 from argparse import Namespace
+from collections.abc import Iterator
 from collections.abc import Sequence
+from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
 import sys
@@ -9,11 +11,15 @@ from typing import Any
 
 from ...core.common.settings import InputError
 from ...core.config import SgorConfig
+from ...evaluation.metrics.row import Row
+from ...evaluation.metrics.row import scan_records
 from ...evaluation.output import save
 from ...evaluation.protocols import pairs as pairing
 from ...evaluation.protocols.pairs import Pair
+from ...evaluation.report import tables
 from ...io.datasets import Drive
 from ...io.datasets import open_drives
+from ...io.terminal import show
 
 WORLD_SEEDS = (0, 1)
 WORLD_SCANS, WORLD_SPEED = 40, 45.0
@@ -85,10 +91,25 @@ def right_pairs(arguments: Namespace, drives: Sequence[Drive], count: int) -> li
 def finish(arguments: Namespace, folder: Path, text: str, records: list[dict[str, Any]],
            right: int = 0, wrong: int = 0) -> None:
     """Print the table and write it with its rows and what it was made with."""
-    print(text)
+    show(text)
     save(folder, text, records, {
         'options': vars(arguments), 'right_pairs': right, 'wrong_pairs': wrong,
         'config': asdict(default_config(arguments))})
+
+
+@contextmanager
+def kept_if_stopped(arguments: Namespace, folder: Path, rows: Sequence[Row]) -> Iterator[None]:
+    """Write the rows that there are where the ``with`` ends early, by Ctrl-C or an error."""
+    try:
+        yield
+    except BaseException:
+        if rows:
+            names = list(dict.fromkeys(row.method for row in rows))
+            pairs = len({(row.source, row.target) for row in rows})
+            save(folder, f'{tables.pairs_table(rows, names, {})}\n\nStopped after {pairs} pairs.',
+                 scan_records(rows), {'options': vars(arguments), 'stopped': True,
+                                      'config': asdict(default_config(arguments))})
+        raise
 
 
 def say(text: str) -> None:

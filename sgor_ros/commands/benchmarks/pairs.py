@@ -10,6 +10,7 @@ from ...evaluation.methods import available
 from ...evaluation.methods import Method
 from ...evaluation.methods import ON_SCANS
 from ...evaluation.methods import sgor
+from ...evaluation.metrics.row import Row
 from ...evaluation.metrics.row import scan_records
 from ...evaluation.protocols import pairs as pairing
 from ...evaluation.report import plots
@@ -43,11 +44,13 @@ def measure(arguments: Namespace, folder: Path) -> None:
     drives = inputs.drives_of(arguments)
     right = inputs.right_pairs(arguments, drives, arguments.limit)
     wrong = pairing.wrong_pairs(drives, arguments.wrong, arguments.seed)
-    rows = run_pairs(right, methods, arguments.seed)
     refusing = [method for method in methods if method.refuses]
-    if wrong and refusing:
-        rows += run_pairs(wrong, refusing, arguments.seed)
-    memory = peak_memory_mb(methods, turned(right[0], arguments.seed)[0])
+    so_far: list[Row] = []
+    with inputs.kept_if_stopped(arguments, folder, so_far):
+        rows = run_pairs(right, methods, arguments.seed, so_far)
+        if wrong and refusing:
+            rows += run_pairs(wrong, refusing, arguments.seed, so_far)
+        memory = peak_memory_mb(methods, turned(right[0], arguments.seed)[0])
     names = [method.name for method in methods]
     text = '\n\n'.join((
         tables.pairs_table(rows, names, memory), tables.data_sets_table(rows, names), tables.RULE

@@ -7,6 +7,7 @@ import numpy as np
 
 from ...core.common.settings import InputError
 from ...evaluation.methods import sgor
+from ...evaluation.metrics.row import Row
 from ...evaluation.metrics.row import scan_records
 from ...evaluation.protocols import pairs as pairing
 from ...evaluation.protocols.pairs import Pair
@@ -43,9 +44,12 @@ def measure(arguments: Namespace, folder: Path) -> None:
     names = [method.name for method in methods]
     kinds = (scene_kinds(arguments.kinds or ())
              if inputs.wants_world(arguments) and arguments.per_kind else {})
-    rows, texts = [], []
+    rows: list[Row] = []
+    so_far: list[Row] = []
+    texts = []
     if arguments.limit or arguments.count:
-        rows = run_pairs(_right_and_wrong(arguments), methods, arguments.seed)
+        with inputs.kept_if_stopped(arguments, folder, so_far):
+            rows = run_pairs(_right_and_wrong(arguments), methods, arguments.seed, so_far)
         labelled = [row for row in rows if row.method == names[0]]
         thresholds = sorted({*np.arange(0.4, 1.0, 0.05).round(2), config.min_confidence})
         texts.append(confidence_table(labelled, thresholds, config.min_confidence)
@@ -54,10 +58,11 @@ def measure(arguments: Namespace, folder: Path) -> None:
                      'default threshold refused keep the confidence that they were refused with.')
     elif not kinds:
         raise InputError('--limit 0 --count 0: nothing is left to do without --per-kind')
-    for number, kind in enumerate(kinds, 1):
-        inputs.say(f'{kind}, {number} of {len(kinds)} kinds: scanning')
-        rows += run_pairs(scene_pairs(kind, arguments.per_kind, arguments.seed), methods,
-                                  arguments.seed)
+    with inputs.kept_if_stopped(arguments, folder, so_far):
+        for number, kind in enumerate(kinds, 1):
+            inputs.say(f'{kind}, {number} of {len(kinds)} kinds: scanning')
+            rows += run_pairs(scene_pairs(kind, arguments.per_kind, arguments.seed), methods,
+                              arguments.seed, so_far)
     repeating = [kind for kind, repeats in kinds.items() if repeats]
     texts += [outcomes.outcome_table(rows, names, repeating), outcomes.RULE,
               outcomes.wrong_claims(rows, names), outcomes.reliability_table(rows, names)]

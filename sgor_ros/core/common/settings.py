@@ -29,7 +29,8 @@ class InputError(ValueError):
 
 
 def setting(default: Value, meaning: str, unit: str = '', *, minimum: float | None = None,
-            maximum: float | None = None, choices: tuple[str, ...] = (), group: str = '') -> Any:
+            maximum: float | None = None, choices: tuple[str, ...] = (), group: str = '',
+            common: bool = False) -> Any:
     """Return a dataclass field that carries its unit, meaning and bounds.
 
     Parameters
@@ -45,9 +46,11 @@ def setting(default: Value, meaning: str, unit: str = '', *, minimum: float | No
         The words that a string may be; empty for any.
     group : str
         Heading under which shells show it.
+    common : bool
+        Whether many users change it: shells show it first.
     """
     metadata = {'meaning': meaning, 'unit': unit, 'minimum': minimum, 'maximum': maximum,
-                'choices': choices, 'group': group}
+                'choices': choices, 'group': group, 'common': common}
     return field(default=default, metadata=metadata)
 
 
@@ -63,6 +66,7 @@ class Setting:
     maximum: float | None
     choices: tuple[str, ...]
     group: str
+    common: bool
 
     @property
     def kind(self) -> type:
@@ -122,11 +126,16 @@ class Settings:
 
     @classmethod
     def shown(cls) -> tuple[Setting, ...]:
-        """Return the fields that users see in nodes, parameter files and ``--help``."""
+        """Return the fields that users see in nodes and parameter files: no ablations."""
         hidden = {item.name for base in cls.__mro__
                   if issubclass(base, Settings) and vars(base).get('FOR_STUDIES')
                   for item in base.settings()}
         return tuple(item for item in cls.settings() if item.name not in hidden)
+
+    @classmethod
+    def common(cls) -> tuple[Setting, ...]:
+        """Return the fields that many users change, which shells show first."""
+        return tuple(item for item in cls.settings() if item.common)
 
     @classmethod
     def current(cls, values: dict[str, Any]) -> dict[str, Any]:

@@ -19,6 +19,7 @@ from ..common.settings import InputError
 from ..scan.ground import Ground
 from ..scoring.pose_scoring import PoseScore
 from ..solver.solution import Solution
+from .notebook import html_of
 
 Array = NDArray[np.float64]
 
@@ -164,6 +165,10 @@ class Registration:
             'correspondences': len(self.inliers), 'inliers': int(self.inliers.sum()),
             'score': None if self.score is None else asdict(self.score),
             'warnings': list(self.warnings), 'timings_s': dict(self.timings)}
+
+    def _repr_html_(self) -> str:
+        """Return what a notebook shows."""
+        return html_of(self)
 
     def __getattr__(self, name: str) -> Any:
         """Answer to the names of version 0.2, with a warning."""

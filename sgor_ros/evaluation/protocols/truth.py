@@ -1,5 +1,5 @@
 """Ground truth refined by ICP, as the literature on KITTI does, and kept for the next run."""
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import replace
 import json
 from pathlib import Path
@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from tqdm import tqdm
 
 from ...core.common.settings import InputError
+from ...io.terminal import progress
 from .pairs import Pair
 
 Array = NDArray[np.float64]
@@ -18,7 +18,7 @@ VOXEL_M, REACH_M, ROUNDS = 0.05, 0.2, 200
 """Point-to-point ICP of clouds thinned to this, from the poses on."""
 
 
-def refined(pairs: Iterable[Pair], cache: Path) -> list[Pair]:
+def refined(pairs: Sequence[Pair], cache: Path) -> list[Pair]:
     """Return pairs with refined truths; what is in the cache is not computed again.
 
     The pose of ICP moves what the first pose has moved: A T. The reverse product, which the
@@ -26,14 +26,15 @@ def refined(pairs: Iterable[Pair], cache: Path) -> list[Pair]:
     """
     known = _read(cache)
     done = []
-    for pair in tqdm(list(pairs), 'ground truth', unit='pair', disable=None):
-        if pair.name not in known:
-            known[pair.name] = _icp(pair).tolist()
-            cache.parent.mkdir(parents=True, exist_ok=True)
-            beside = cache.with_suffix('.part')
-            beside.write_text(json.dumps(known))
-            beside.replace(cache)
-        done.append(replace(pair, T_target_source=np.array(known[pair.name])))
+    with progress('ground truth', len(pairs), 'pair') as told:
+        for pair in told.over(pairs):
+            if pair.name not in known:
+                known[pair.name] = _icp(pair).tolist()
+                cache.parent.mkdir(parents=True, exist_ok=True)
+                beside = cache.with_suffix('.part')
+                beside.write_text(json.dumps(known))
+                beside.replace(cache)
+            done.append(replace(pair, T_target_source=np.array(known[pair.name])))
     return done
 
 

@@ -28,7 +28,8 @@ LEVELS = 2
 """Drives are looked for so far below a folder."""
 
 
-def open_drive(path: str | Path, sequence: str | None = None) -> Drive:
+def open_drive(path: str | Path, sequence: str | None = None,
+               labels: str | Path | None = None) -> Drive:
     """Open the scans of a path; which layout it is, is seen from the names in it.
 
     Parameters
@@ -38,6 +39,9 @@ def open_drive(path: str | Path, sequence: str | None = None) -> Drive:
         download of nuScenes, or any folder of ``.bin``, ``.npz``, ``.pcd`` and ``.ply``.
     sequence : str, optional
         Which drive, where the path holds several: its name or the last part of it.
+    labels : str or Path, optional
+        Folder with a ``.label`` for each scan, by its name: a path, or the name of one in the
+        folder of the drive.
 
     Returns
     -------
@@ -49,7 +53,7 @@ def open_drive(path: str | Path, sequence: str | None = None) -> Drive:
     InputError
         Nothing to read there, several drives and none chosen, or files that do not fit together.
     """
-    found = open_drives(path)
+    found = open_drives(path, labels)
     if sequence is not None:
         chosen = [drive for drive in found
                   if sequence in (drive.name, drive.name.rpartition('/')[2])]
@@ -63,10 +67,12 @@ def open_drive(path: str | Path, sequence: str | None = None) -> Drive:
     raise InputError(f'{path}: {problem}; there are {", ".join(drive.name for drive in found)}')
 
 
-def open_drives(path: str | Path) -> list[Drive]:
+def open_drives(path: str | Path, labels: str | Path | None = None) -> list[Drive]:
     """Open all drives of a path, itself or up to two levels below; otherwise as `open_drive`."""
     path = Path(path)
     if bags.recognises(path):
+        if labels is not None:
+            raise InputError(f'labels {labels}: the clouds of a bag have theirs in a field')
         return bags.drives(path, path.stem)
     if not path.exists():
         raise InputError(f'{path}: no such file or folder')
@@ -82,11 +88,23 @@ def open_drives(path: str | Path) -> list[Drive]:
             layout = next((each for each in layouts if each.recognises(folder)), None)
             if layout is not None and not any(folder.is_relative_to(above) for above in taken):
                 taken.append(folder)
-                found += layout.drives(folder, _name(folder, path))
+                found += _drives(layout, folder, _name(folder, path), labels)
         if found:
             return [_checked(drive) for drive in found]
     raise InputError(f'{path}: no folder velodyne in it or in {LEVELS} levels below, and nothing '
                      f'else that is a drive: see docs/data.md')
+
+
+def _drives(layout: ModuleType, folder: Path, name: str, labels: str | Path | None
+            ) -> list[Drive]:
+    if labels is None:
+        found: list[Drive] = layout.drives(folder, name)
+    elif layout in (semantickitti, scans):
+        found = layout.drives(folder, name, labels)
+    else:
+        raise InputError(f'labels {labels}: {folder} has its own, in the layout of '
+                         f'{layout.__name__.rpartition(".")[2]}')
+    return found
 
 
 def _checked(drive: Drive) -> Drive:

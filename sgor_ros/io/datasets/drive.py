@@ -120,7 +120,7 @@ class Drive:
         found = list(dict.fromkeys(scan.label_convention for scan in self.scans))
         if len(found) > 1:
             raise InputError(f'{self.name}: its scans have labels of several conventions '
-                             f'({", ".join(found)}); choose one folder of labels')
+                             f'({", ".join(found)}); choose one folder by labels')
         return found[0]
 
 

@@ -48,6 +48,19 @@ def partners(folder: Path, suffix: str, scans: Sequence[Path]) -> list[Path]:
     return found
 
 
+def partners_in(labels: str | Path, beside: Path, scans: Sequence[Path]) -> list[Path]:
+    """Return the labels of each scan in a folder that a user names, as a path or `beside` them.
+
+    Raises
+    ------
+    InputError
+        As of `partners`.
+    """
+    own = beside / labels
+    return partners(own if own.is_dir() or not Path(labels).is_dir() else Path(labels), '.label',
+                    scans)
+
+
 def rows_of(table: Path, count: int, scans: Sequence[Path]) -> list[int]:
     """Return the row of each scan in a table of `count` rows.
 

@@ -11,7 +11,7 @@ from .drive import Drive
 from .drive import DriveScan
 from .files import calibration
 from .files import files_in
-from .files import partners
+from .files import partners_in
 from .files import read_poses
 from .files import read_times
 
@@ -26,12 +26,12 @@ def recognises(path: Path) -> bool:
     return (path / 'velodyne').is_dir()
 
 
-def drives(path: Path, name: str) -> list[Drive]:
-    """Return the one drive of a sequence, with the best labels that each scan has."""
-    return [sequence(path, name)]
+def drives(path: Path, name: str, labels: str | Path | None = None) -> list[Drive]:
+    """Return the one drive of a sequence, with those labels or the best that each scan has."""
+    return [sequence(path, name, labels)]
 
 
-def sequence(path: Path, name: str, labels: str | None = None) -> Drive:
+def sequence(path: Path, name: str, labels: str | Path | None = None) -> Drive:
     """Read a sequence.
 
     Parameters
@@ -41,8 +41,9 @@ def sequence(path: Path, name: str, labels: str | None = None) -> Drive:
         ``poses.txt`` or, as KITTI has it, ``../../poses/08.txt``. Poses are of the camera that
         ``Tr`` of ``calib.txt`` maps the LiDAR to; where there is no calib.txt, of the LiDAR.
     name : str
-    labels : str, optional
-        Folder with a ``.label`` for each scan; without it each scan has the best there is.
+    labels : str or Path, optional
+        Folder with a ``.label`` for each scan, here or anywhere; without it each scan has the
+        best there is.
 
     Raises
     ------
@@ -51,7 +52,7 @@ def sequence(path: Path, name: str, labels: str | None = None) -> Drive:
     """
     scans = files_in(path / 'velodyne', '.bin')
     chosen = ([best_labels(scan) for scan in scans] if labels is None
-              else partners(path / labels, '.label', scans))
+              else partners_in(labels, path, scans))
     drive_scans = [drive_scan(scan, its, f'{name}/{scan.stem}')
               for scan, its in zip(scans, chosen, strict=True)]
     stamps = read_times(path / 'times.txt', scans) if (path / 'times.txt').is_file() else None
