@@ -42,3 +42,49 @@ def mounted(scan: SemanticScan, frame: str, T_base_cloud: NDArray[np.float64],
     if frame == config.base_frame and config.T_base_sensor:
         origin = parse_transform(config.T_base_sensor, 'T_base_sensor')[:3, 3]
     return scan.mounted(up=T_base_cloud[2, :3], origin=origin)
+
+
+class Mount:
+    """The extrinsic, asked once for each scan.
+
+    Parameters
+    ----------
+    extrinsic : callable or None
+        None where the pose of the sensor is published.
+    config : StreamConfig
+    """
+
+    def __init__(self, extrinsic: Extrinsic | None, config: StreamConfig) -> None:
+        self._extrinsic = extrinsic
+        self._config = config
+        self._last: tuple[str, int, NDArray[np.float64]] | None = None    # frame, stamp, pose
+
+    @property
+    def known(self) -> bool:
+        """Whether there is a base whose pose is published."""
+        return self._extrinsic is not None
+
+    def T_base_sensor(self, stamp_ns: int, frame: str) -> NDArray[np.float64] | str:
+        """Return the mount at a stamp, or why there is none; the identity without a base."""
+        if self._extrinsic is None:
+            return np.eye(4)
+        if self._last is not None and self._last[:2] == (frame, stamp_ns):
+            return self._last[2]
+        found = self._extrinsic(stamp_ns, frame)
+        if not isinstance(found, str):
+            self._last = frame, stamp_ns, found
+        return found
+
+    def of(self, scan: SemanticScan, stamp_ns: int, frame: str) -> SemanticScan:
+        """Return the scan with which way is up, by the mount of the scan before or its own.
+
+        Where the mount of its own frame is known no scan waits for a transform before it is
+        tracked.
+        """
+        if self._extrinsic is None:
+            return scan
+        if ((self._last is None or self._last[0] != frame)
+                and isinstance(self.T_base_sensor(stamp_ns, frame), str)):
+            return scan
+        assert self._last is not None
+        return mounted(scan, frame, self._last[2], self._config)

@@ -36,4 +36,5 @@ def _prepare() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)    # a terminal sends it to all; the node decides
     ctypes.CDLL(None).prctl(DIE_WITH_PARENT, signal.SIGKILL)
     choose_cache_folder()
-    import_module('..mapping.verification', __package__)    # compiled code takes a second to load
+    # compiled code takes a second to load
+    import_module('..mapping.loops.verification', __package__)

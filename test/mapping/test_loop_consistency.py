@@ -6,8 +6,8 @@ from sgor_ros.core.common import se3
 from sgor_ros.mapping.config import MapperConfig
 from sgor_ros.mapping.edge import Edge
 from sgor_ros.mapping.edge import Kind
-from sgor_ros.mapping.loop_consistency import LoopConsistency
-from sgor_ros.mapping.paths import Paths
+from sgor_ros.mapping.loops.loop_consistency import LoopConsistency
+from sgor_ros.mapping.loops.paths import Paths
 
 CONFIG = MapperConfig()
 SURE = np.diag([0.01**2] * 3 + [0.001**2] * 3)

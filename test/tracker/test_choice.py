@@ -19,6 +19,7 @@ from sgor_ros.core.degeneracy.directions import DegenerateDirection
 from sgor_ros.core.degeneracy.directions import independent
 from sgor_ros.core.verdict.result import Placement
 from sgor_ros.core.verdict.result import Status
+from sgor_ros.tracker import scan_registration
 from sgor_ros.tracker import tracker as tracker_module
 from sgor_ros.tracker.choice import _information
 from sgor_ros.tracker.choice import choose as choose_refined
@@ -219,7 +220,7 @@ def test_through_a_tunnel_the_covariance_says_what_is_not_known(monkeypatch, mod
 
     kept = []
     monkeypatch.setattr(tracker_module, 'preprocess', prepare)
-    monkeypatch.setattr(tracker_module, 'register', lambda source, target, _: tunnel.register(
+    monkeypatch.setattr(scan_registration, 'register', lambda source, target, _: tunnel.register(
         number[id(source)], number[id(target)]))
     # here are no clouds to test a prediction on
     tracker = Tracker(tracker_config=TrackerConfig(mode=mode, predict_first=False))
@@ -323,7 +324,7 @@ def test_a_fault_of_the_program_costs_one_scan(street, monkeypatch, caplog):
     def fail(*_, **__):
         raise np.linalg.LinAlgError('Singular matrix')
     with monkeypatch.context() as patch:
-        patch.setattr(tracker_module, 'register', fail)
+        patch.setattr(scan_registration, 'register', fail)
         failed = tracker.track(scans[1], 2 * PERIOD_NS)
     assert not failed.success
     assert failed.state is State.FAILED

@@ -16,7 +16,7 @@ from ...core.config import PREPARATION
 from ...core.config import SgorConfig
 from ..edge import Edge
 from ..keyframe import Keyframes
-from ..loop_consistency import LoopConsistency
+from ..loops.loop_consistency import LoopConsistency
 from ..pose_graph import PoseGraph
 from .localisation import locate
 

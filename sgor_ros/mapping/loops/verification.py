@@ -6,18 +6,18 @@ from concurrent.futures import Future
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.compact_scan import compact
-from ..core.compact_scan import CompactScan
-from ..core.config import prepares_alike
-from ..core.config import SgorConfig
-from ..core.prepared_scan import PreparedScan
-from ..core.registration import register
-from ..tracker.deskewing import with_frames
+from ...core.compact_scan import compact
+from ...core.compact_scan import CompactScan
+from ...core.config import prepares_alike
+from ...core.config import SgorConfig
+from ...core.prepared_scan import PreparedScan
+from ...core.registration import register
+from ...tracker.deskewing import with_frames
+from ..edge import Edge
+from ..edge import Kind
+from ..keyframe import Keyframes
 from .candidates import Candidate
 from .candidates import Candidates
-from .edge import Edge
-from .edge import Kind
-from .keyframe import Keyframes
 
 Found = tuple[NDArray[np.float64], NDArray[np.float64]] | None
 """T_target_source and its covariance; None where the pair is none."""

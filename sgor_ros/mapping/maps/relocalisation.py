@@ -5,14 +5,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 from numpy.typing import NDArray
 
-from ..core.common import se3
-from ..core.common.settings import InputError
-from ..core.prepared_scan import PreparedScan
-from ..core.verdict.result import Status
-from .edge import Edge
-from .maps.map import Map
-from .maps.result import Located
-from .odometry import Node
+from ...core.common import se3
+from ...core.common.settings import InputError
+from ...core.prepared_scan import PreparedScan
+from ...core.verdict.result import Status
+from ..edge import Edge
+from ..odometry import Node
+from .map import Map
+from .result import Located
 
 Array = NDArray[np.float64]
 
@@ -57,6 +57,13 @@ class Relocalisation:
                 T[:3, :3] @ T[:3, :3].T, np.eye(3), atol=1e-3):
             raise InputError('T_map_sensor: expected a pose (4, 4)')
         self.hint, self.hint_is_new = T, True
+
+    def nearest_to_hint(self, nodes: list[int], T_map_sensor: Array) -> list[int]:
+        """Return nodes with poses (N, 4, 4), nearest to the hint first; none without a hint."""
+        if self.hint is None:
+            return []
+        distance = np.linalg.norm((T_map_sensor - self.hint)[:, :3, 3], axis=1)
+        return [nodes[row] for row in np.argsort(distance)]
 
     def look_for(self, node: Node, prepared: PreparedScan) -> tuple[list[Edge], Located]:
         """Look for a node all over the map.

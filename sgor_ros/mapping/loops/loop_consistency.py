@@ -15,11 +15,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..tracker.motion import GATE
-from .config import MapperConfig
-from .edge import chained
-from .edge import Edge
-from .edge import squared_distance
+from ...tracker.motion import GATE
+from ..config import MapperConfig
+from ..edge import chained
+from ..edge import Edge
+from ..edge import squared_distance
 from .paths import Paths
 
 Array = NDArray[np.float64]

@@ -6,8 +6,8 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
-from .edge import chained
-from .edge import Edge
+from ..edge import chained
+from ..edge import Edge
 
 Array = NDArray[np.float64]
 

@@ -7,12 +7,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.prepared_scan import PreparedScan
-from .config import MapperConfig
-from .keyframe import Keyframes
-from .odometry import Node
+from ...core.prepared_scan import PreparedScan
+from ..config import MapperConfig
+from ..keyframe import Keyframes
+from ..odometry import Node
+from ..pose_graph import PoseGraph
 from .paths import Paths
-from .pose_graph import PoseGraph
 
 Array = NDArray[np.float64]
 
