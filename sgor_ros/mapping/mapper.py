@@ -126,6 +126,7 @@ class Mapper:
             if added is not None:
                 assert prepared is not None, 'a keyframe comes with its prepared scan'
                 self._add_node(*added, prepared)
+                self._trim()
         # where a track begins, its place in the map is what the scan is waited for
         closed = self._loops.work(self.tracker.config, at_once=tracked.restarted)
         return self._result(tracked, closed)
@@ -146,6 +147,11 @@ class Mapper:
         covered = self._loops.add_candidates(node, prepared, self._session.nodes, but)
         if not covered and not self.frozen:
             self.keyframes.add(node.id, node.stamp_ns, node.track_id, prepared)
+
+    def _trim(self) -> None:
+        """Bound what is kept of the drive as long as nothing is added to the map."""
+        if self._frozen is not None and self._session.trim(self._frozen.nodes):
+            self._loops.forget_nodes()
 
     def _relocalise(self, node: Node, prepared: PreparedScan) -> None:
         """Look for a node all over the map that was there before.

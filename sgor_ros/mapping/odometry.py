@@ -1,5 +1,6 @@
 """From tracked scans to nodes and odometry edges of the graph, and back to a pose of each scan."""
 from collections.abc import Iterable
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +14,7 @@ from ..tracker.choice import or_unknown
 from .edge import Edge
 from .pose_graph import PoseGraph
 from .result import Trajectory
+from .scan_poses import ScanPoses
 
 Array = NDArray[np.float64]
 
@@ -65,9 +67,7 @@ class Odometry:
         self.nodes: dict[int, Node] = {node.id: node for node in known}
         self.first = max(self.nodes, default=-1) + 1
         self._last: dict[int, Node] = {}
-        self._stamps_ns: list[int] = []
-        self._anchors: list[int] = []
-        self._T_anchor_sensor: list[Array] = []
+        self._scans = ScanPoses()
         self._way = 0.0
         self._before: tuple[int, Array] | None = None
 
@@ -93,14 +93,19 @@ class Odometry:
         if tracked.keyframe_id is None or (
                 on is not None and config.mode == 'consecutive' and not _is_far(on, T, config)):
             assert on is not None, 'a track begins with a keyframe'
-            self._hang(tracked.stamp_ns, on.id, se3.inverse(on.T_odom_sensor) @ T)
+            self._scans.add(tracked.stamp_ns, on.id, se3.inverse(on.T_odom_sensor) @ T)
             return None
         node = Node(tracked.keyframe_id + self.first, tracked.stamp_ns, track, T,
                     tracked.covariance, self._way)
         self.nodes[node.id] = self._last[track] = node
-        self._hang(tracked.stamp_ns, node.id, np.eye(4))
+        self._scans.add(tracked.stamp_ns, node.id, np.eye(4))
         return node, None if on is None else edge_between(on, node, (
             tracked.reference_covariance if on.id == reference else None))
+
+    @property
+    def last_nodes(self) -> list[int]:
+        """The newest node of each track."""
+        return [node.id for node in self._last.values()]
 
     def last(self, track_id: int) -> Node:
         """Return the newest node of a track."""
@@ -108,9 +113,10 @@ class Odometry:
 
     def last_pose(self, graph: PoseGraph) -> Array:
         """Return T_map_sensor of the last scan that has a pose; the origin before the first."""
-        if not self._anchors:
+        if not len(self._scans):
             return np.eye(4)
-        return graph.pose(self._anchors[-1]) @ self._T_anchor_sensor[-1]
+        node, T_node_sensor = self._scans.last()
+        return graph.pose(node) @ T_node_sensor
 
     def node_at(self, stamp_ns: int) -> int:
         """Return the node of a stamp.
@@ -125,20 +131,20 @@ class Odometry:
                 return node.id
         raise InputError(f'stamp_ns = {stamp_ns}: that of no keyframe')
 
-    def _hang(self, stamp_ns: int, node: int, T_node_sensor: Array) -> None:
-        self._stamps_ns.append(stamp_ns)
-        self._anchors.append(node)
-        self._T_anchor_sensor.append(T_node_sensor)
-
     def trajectory(self, graph: PoseGraph, *, loops: bool = True) -> Trajectory:
         """Return the pose of each scan in the map, or by odometry alone."""
-        anchors, rows = np.unique(np.array(self._anchors, np.int64), return_inverse=True)
-        nodes = anchors.tolist()
+        held, rows = np.unique(self._scans.nodes, return_inverse=True)
+        nodes = held.tolist()
         poses = graph.poses(nodes) if loops else graph.poses_by_odometry(nodes)
-        T_anchor_sensor = np.array(self._T_anchor_sensor).reshape(-1, 4, 4)
         return Trajectory(
-            np.array(self._stamps_ns, np.int64), poses[rows] @ T_anchor_sensor,
+            self._scans.stamps_ns, poses[rows] @ self._scans.T_node_sensor,
             np.array([graph.part(node) for node in nodes], np.int64)[rows])
+
+    def forget(self, bases: Mapping[int, tuple[int, Array]]) -> None:
+        """Forget nodes; their scans go on others, with T_other_node (4, 4)."""
+        self._scans.move(bases)
+        for node in bases:
+            del self.nodes[node]
 
 
 def edge_between(target: Node, source: Node, step: Array | None = None) -> Edge:

@@ -47,22 +47,28 @@ class PoseGraph:
     """
 
     def __init__(self) -> None:
-        self.edges: list[Edge] = []
         self.missing = ''
-        self._row: dict[int, int] = {}
-        self._poses = np.empty((0, 4, 4))
-        self._parent: list[int] = []
         self._gtsam: Any = None
         try:
             self._gtsam = library()
         except ImportError as error:
             self.missing = f'loops are not closed: GTSAM is not installed ({error}); {INSTALL}'
+        self._clear()
+
+    def _clear(self) -> None:
+        self.edges: list[Edge] = []
+        self._row: dict[int, int] = {}
+        self._poses = np.empty((0, 4, 4))
+        self._parent: list[int] = []
         self._solver: Any = None
         self._new: list[int] = []    # nodes that the solver has not got yet, with their edges
         self._new_edges: list[Edge] = []
 
     def __len__(self) -> int:
         return len(self._row)
+
+    def __contains__(self, node: object) -> bool:
+        return node in self._row
 
     @property
     def nodes(self) -> list[int]:
@@ -121,6 +127,12 @@ class PoseGraph:
         self._new_edges.append(edge)
         self._append(edge.source, self.pose(edge.target) @ edge.T_target_source,
                      self.part(edge.target))
+
+    def keep(self, nodes: Iterable[int], edges: Iterable[Edge]) -> None:
+        """Keep some nodes where they are, joined by these edges, and forget all others."""
+        poses = {node: self.pose(node) for node in nodes}
+        self._clear()
+        self.add_map(poses, edges)
 
     def close(self, loops: Sequence[Edge]) -> None:
         """Add edges between nodes that are there, and optimise. They may join parts."""

@@ -1,4 +1,5 @@
 """One drive, in a map of before or a new one: its nodes in the pose graph, its scans on them."""
+from collections.abc import Container
 from collections.abc import Mapping
 import math
 
@@ -19,6 +20,8 @@ from .odometry import Odometry
 from .pose_graph import PoseGraph
 from .result import Loop
 from .result import Trajectory
+from .trimming import edges_without
+from .trimming import too_many
 
 Array = NDArray[np.float64]
 
@@ -81,6 +84,28 @@ class Session:
             else:
                 self.graph.add_node(edge)
         return added
+
+    def trim(self, map_nodes: Container[int]) -> bool:
+        """Let the oldest nodes of the drive go where there are many; return whether any went.
+
+        Those of the map and of keyframes stay, and the last of each track, which may come back.
+        Scans on nodes that go stay where they are, seen from the first node of their part.
+        """
+        stay = {node for node in self.graph.nodes if node in map_nodes or node in self.keyframes}
+        going = set(too_many(self.graph, stay.union(self._odometry.last_nodes)))
+        if not going:
+            return False
+        kept = [node for node in self.graph.nodes if node not in going]
+        firsts: dict[int, int] = {}
+        for node in kept:
+            firsts.setdefault(self.graph.part(node), node)
+        bases = {}
+        for node in going:
+            first = firsts[self.graph.part(node)]
+            bases[node] = first, se3.inverse(self.graph.pose(first)) @ self.graph.pose(node)
+        self.graph.keep(kept, edges_without(self.graph, going))
+        self._odometry.forget(bases)
+        return True
 
     def last_pose(self) -> Array:
         """Return T_map_sensor of the last scan that has a pose; the origin before the first."""

@@ -63,6 +63,10 @@ class LoopClosing:
         """Take in an odometry edge, by which loops are judged."""
         self.consistency.paths.add(edge)
 
+    def forget_nodes(self) -> None:
+        """Forget what is known of nodes that have left the graph."""
+        self.consistency.keep(self._graph, self._graph.edges)
+
     def add_candidates(self, node: Node, prepared: PreparedScan, nodes: Mapping[int, Node],
                        but: Container[int] = ()) -> bool:
         """Let the candidates of a new node wait; return whether its place has a keyframe already.
@@ -100,6 +104,8 @@ class LoopClosing:
         if self._verification.fault and self.enabled:
             self.enabled = False
             self.warnings.append(self._verification.fault)
+        # one that was registered elsewhere for long may have left the graph
+        found = [loop for loop in found if loop.source in self._graph]
         return self.offer(found) if found else []
 
     def offer(self, loops: Iterable[Edge]) -> list[Edge]:

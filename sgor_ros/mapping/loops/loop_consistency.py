@@ -10,6 +10,7 @@ close cycles that contradict theirs, more have to agree than contradict.
 Should a false loop be believed all the same, right ones will contradict it and agree with each
 other: then all of them are asked again, by GNC in the pose graph.
 """
+from collections.abc import Container
 from collections.abc import Sequence
 
 import numpy as np
@@ -92,9 +93,15 @@ class LoopConsistency:
 
     def begin_anew(self, believed: Sequence[Edge]) -> None:
         """Believe these edges and no others; what contradicted the old ones is forgotten."""
-        self.paths, self.contradicting = Paths(), []
-        for edge in believed:
-            self.paths.add(edge)
+        self.contradicting = []
+        self.paths = _paths(believed)
+
+    def keep(self, nodes: Container[int], believed: Sequence[Edge]) -> None:
+        """Believe these edges and no others; forget loops at other nodes than these."""
+        self.waiting, self.contradicting = (
+            [loop for loop in loops if loop.source in nodes and loop.target in nodes]
+            for loops in (self.waiting, self.contradicting))
+        self.paths = _paths(believed)
 
     def _believe(self, loops: list[Edge]) -> list[Edge]:
         """Take in loops that agree with the first; those that contradict each other stay out."""
@@ -106,6 +113,13 @@ class LoopConsistency:
                 believed.append(loop)
         self.waiting = [other for other in self.waiting if all(other is not one for one in loops)]
         return believed
+
+
+def _paths(edges: Sequence[Edge]) -> Paths:
+    paths = Paths()
+    for edge in edges:
+        paths.add(edge)
+    return paths
 
 
 def _fit(loop: Edge, T_target_source: Array, covariance: Array) -> bool:

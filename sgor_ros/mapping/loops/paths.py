@@ -58,6 +58,11 @@ class Paths:
 
     def between(self, target: int, source: int) -> tuple[Array, Array] | None:
         """Return T_target_source with its covariance; None where no way leads there."""
+        edges = self.way(target, source)
+        return None if edges is None else chained(edges)
+
+    def way(self, target: int, source: int) -> list[Edge] | None:
+        """Return the edges of that way, end to end from the target; None where there is none."""
         variances, before = self._search(source)
         if target not in self._row or not np.isfinite(variances[self._row[target]]):
             return None
@@ -65,7 +70,7 @@ class Paths:
         while before[row] >= 0:
             edges.append(self._edges[row, int(before[row])])
             row = int(before[row])
-        return chained(edges)
+        return edges
 
     def _search(self, node: int) -> tuple[Array, Array]:
         """Return the variance of the surest way from a node to each, and the one before each."""
