@@ -1,11 +1,10 @@
 """Loops and a pose graph on top of the tracker, without ROS and without files.
 
-`mapper` is the way of one scan. Beside it: `odometry` (nodes and edges out of tracked scans),
-`keyframe` (what is kept of a scan), `retrieval` (which look alike), `candidates` (which pairs to
-try and when), `verification` (they are registered), `loop_consistency` (which loops to believe, by
-`paths`: the surest way between two nodes), `pose_graph` (GTSAM), `edge` and `result` (what goes in
-and out). `map_cloud` (the map as one cloud). `maps` (maps that stay), `relocalisation` (where in
-one of them the sensor is, while it is lost).
+`mapper` is the way of one scan. Beside it: `session` (one drive, in a map of before or a new one),
+`odometry` and `scan_poses` (nodes and edges out of tracked scans, and the pose of each scan),
+`keyframe` (what is kept of a scan), `retrieval` (which look alike), `loops` (how a loop is
+closed), `pose_graph` (GTSAM), `trimming` (old nodes go), `edge` and `result` (what goes in and
+out), `map_cloud` (the map as one cloud). `maps`: maps that stay.
 """
 from .config import MapperConfig
 from .mapper import Mapper

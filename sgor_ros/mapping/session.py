@@ -10,6 +10,7 @@ from ..core.common import se3
 from ..core.config import SgorConfig
 from ..tracker import TrackedScan
 from ..tracker import TrackerConfig
+from ..tracker.keyframes import Keyframe
 from .config import MapperConfig
 from .edge import Edge
 from .edge import Kind
@@ -84,6 +85,15 @@ class Session:
             else:
                 self.graph.add_node(edge)
         return added
+
+    def keep_deskewed(self, reference: Keyframe | None) -> None:
+        """Keep a keyframe of the tracker anew whose motion was known only with the next scan."""
+        node = None if reference is None else self.node_of(reference.id)
+        if reference is None or node is None or node not in self.keyframes:
+            return
+        kept = self.keyframes[node]
+        if kept.frame_covariance is not reference.prepared.frame_covariance:
+            self.keyframes.add(kept.id, kept.stamp_ns, kept.track_id, reference.prepared)
 
     def trim(self, map_nodes: Container[int]) -> bool:
         """Let the oldest nodes of the drive go where there are many; return whether any went.

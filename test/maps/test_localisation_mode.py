@@ -98,7 +98,8 @@ class Said:
         self.mapper.add(replace(
             self.origin, stamp_ns=stamp_ns, track_id=self.track, restarted=begins,
             T_odom_sensor=T_odom_sensor, covariance=1e-6 * (1 + self.count) * np.eye(6),
-            reference_id=self.references.get(self.track), reference_covariance=1e-6 * np.eye(6), keyframe=keyframe,
+            reference_id=self.references.get(self.track),
+            reference_covariance=1e-6 * np.eye(6), keyframe=keyframe,
             keyframe_id=self.keyframes if keyframe else None), self.prepared)
         if keyframe:
             self.references[self.track] = self.keyframes

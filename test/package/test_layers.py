@@ -131,9 +131,18 @@ def test_the_rooms_of_the_node_do_not_know_the_node():
         assert not [name for name in imports_of(path) if name.startswith(above)], path
 
 
-MAPPING = ('config', 'edge', 'result', 'retrieval', 'paths', 'pose_graph', 'odometry', 'keyframe',
-           'map_cloud', 'loop_consistency', 'candidates', 'verification', 'maps',
-           'relocalisation', 'mapper')
+MAPPING = ('config', 'edge', 'result', 'retrieval', 'pose_graph', 'scan_poses', 'odometry',
+           'keyframe', 'map_cloud', 'loops', 'trimming', 'maps', 'session', 'mapper')
+
+# files in a room, or in a folder that is one, each above those that it may import
+WITHIN = {
+    'mapping/loops': ('paths', 'loop_consistency', 'candidates', 'verification', 'loop_closing'),
+    'pipeline': ('outcome', 'query', 'sinks', 'loop_process', 'extrinsic', 'published_frames',
+                 'scan_messages', 'pipeline'),
+    'tracker': ('config', 'covariance', 'stamps', 'result', 'motion', 'keyframes',
+                'keyframe_selection', 'choice', 'deskewing', 'scan_at_work', 'track',
+                'scan_registration', 'tracker'),
+}
 
 
 def test_the_files_of_mapping_lie_on_each_other():
@@ -146,6 +155,27 @@ def test_the_files_of_mapping_lie_on_each_other():
         others = {name.split('.')[2] for name in imports_of(path)
                   if name.startswith('sgor_ros.mapping.')}
         assert others - {room} <= set(below), path
+
+
+@pytest.mark.parametrize('room', WITHIN)
+def test_the_files_of_a_room_lie_on_each_other(room):
+    """The way of a scan, or of a loop, is on top."""
+    folder, files = PACKAGE / room, WITHIN[room]
+    assert {path.stem for path in folder.glob('*.py')} == {'__init__', *files}
+    for path in folder.glob('*.py'):
+        if path.stem == '__init__':
+            continue
+        prefix = f'sgor_ros.{room.replace("/", ".")}.'
+        others = {name.removeprefix(prefix).split('.')[0] for name in imports_of(path)
+                  if name.startswith(prefix)}
+        assert others <= set(files[:files.index(path.stem)]), path
+
+
+def test_no_file_on_the_way_of_a_scan_is_long():
+    """One idea a file."""
+    for path in SOURCES:
+        if layer_of(path) in {'tracker', 'mapping', 'pipeline'}:
+            assert len(path.read_text().splitlines()) < 300, path
 
 
 def test_the_public_interface_is_core_tracker_and_mapping():
