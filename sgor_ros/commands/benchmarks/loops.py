@@ -16,8 +16,8 @@ from ...evaluation.protocols.returns import there_and_back
 from ...evaluation.report.loop_plots import plot_loops
 from ...evaluation.report.loop_table import loop_records
 from ...evaluation.report.loop_table import loop_table
-from ...evaluation.report.loop_table import others_table
 from ...evaluation.report.loop_table import OTHERS_RULE
+from ...evaluation.report.loop_table import others_table
 from ...evaluation.report.loop_table import RULE
 from ...io.datasets import Drive
 from ...mapping.map_cloud import map_cloud
