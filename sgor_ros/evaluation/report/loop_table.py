@@ -19,7 +19,7 @@ RULE = ('Revisits: keyframes within 20 m of one that was passed much earlier, an
         f'{NEES_95:.1f} (95 %). APE: root of the mean square, from the first scan on, by odometry '
         'and with loops; where tracks stay apart, of the first. Chi-squared: of the whole graph, '
         'per degree of freedom.')
-OTHERS_RULE = ('Others: revisits whose scan lies in a local map that a right loop was closed from; '
+OTHERS_RULE = ('Others: revisits whose scan lies in a local map that closed a right loop; '
                'loops are those between local maps, judged alike. CPU: odometry included.')
 
 
