@@ -86,7 +86,11 @@ def _parse(arguments: list[str] | None) -> argparse.Namespace:
                         'facade, garage_half_full, ...: a wrong one lists them all')
     parser.add_argument('--data', type=Path, metavar='FOLDER', help='play this recorded drive '
                         'instead of the built-in world: velodyne/*.bin and poses.txt, the truth')
+    parser.add_argument('--no-loops', action='store_true', help='odometry alone; --data has none '
+                        'either')
     options = parser.parse_args(arguments)
+    # the way back of a recorded drive has the very scans of the way there
+    options.loops = not options.no_loops and options.data is None
     if options.scans < 2:
         parser.error(f'--scans {options.scans}: at least 2')
     if not 0.1 <= options.rate <= 100:
@@ -116,8 +120,7 @@ def _run(options: argparse.Namespace) -> int:
     convention = (recorded or SgorConfig()).label_convention
     with closing(Domain()) as domain, NodeProcess(
             domain, out / 'node.log', '-p', f'label_convention:={convention}',
-            # the way back of a recorded drive has the very scans of the way there
-            '-p', f'loop_closure:={str(options.data is None).lower()}') as node:
+            '-p', f'loop_closure:={str(options.loops).lower()}') as node:
         # while the node starts
         recorded = recorded or _built_in(options, most)
         drive = recorded.truth
@@ -200,7 +203,7 @@ def _compare(player: 'Player', truth: dict[int, Array], world: WorldMap, memory_
     counts = list(told.values())[-1]
     loops = [loop_of(message) for message in player.loops]
     _say(report(len(sent), counts, seconds, latency, errors, memory_mb,
-                None if options.data else [
+                None if not options.loops else [
                     np.linalg.norm((se3.inverse(truth[target]) @ truth[source] - T)[:3, 3])
                     for target, source, T in loops]))
     if len(answered) < SWIFT_SHARE * len(sent):

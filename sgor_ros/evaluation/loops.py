@@ -1,4 +1,8 @@
-"""Runs the mapper over drives that come back to places, and judges its loops by the truth."""
+"""Runs the mapper over drives that come back to places, and judges its loops by the truth.
+
+Others that close loops run over the same scans.
+"""
+from collections.abc import Callable
 from dataclasses import dataclass
 import time
 
@@ -13,6 +17,8 @@ from ..io.terminal import progress
 from ..mapping import Loop
 from ..mapping import Mapper
 from ..mapping import MapperConfig
+from ..mapping.edge import Kind
+from .methods.loop_closing import LoopCloser
 from .metrics.pose_error import nees
 from .metrics.pose_error import rotation_error_deg
 from .metrics.pose_error import translation_error_m
@@ -41,9 +47,13 @@ class LoopRun:
     megabytes : float
         Of all keyframes.
     revisits, closed : int
-        Nodes at places that were seen before, and those of them that are the source of a loop.
+        Nodes at places that were seen before, and those of them that are the source of a right
+        loop.
+    loops : list of Loop
     error_m, error_deg, nees : (L,) float64
         Of each loop.
+    odometry_nees : (E,) float64
+        Of each odometry edge of the graph.
     wrong : int
     ape_before_m, ape_after_m : float
         Root of the mean square, from the first scan on, of the poses that are joined to it.
@@ -62,9 +72,11 @@ class LoopRun:
     megabytes: float
     revisits: int
     closed: int
+    loops: list[Loop]
     error_m: Array
     error_deg: Array
     nees: Array
+    odometry_nees: Array
     wrong: int
     ape_before_m: float
     ape_after_m: float
@@ -72,6 +84,35 @@ class LoopRun:
     freedom: int
     cpu_seconds: float
     mapper: Mapper
+
+
+@dataclass(frozen=True, eq=False)
+class OtherRun:
+    """What another method made of the same drive.
+
+    Attributes
+    ----------
+    method, drive : str
+    scans, revisits : int
+        As the mapper has them.
+    closed : int
+        Revisits whose scan lies in a local map from which a right loop was closed.
+    error_m, error_deg : (L,) float64
+        Of each loop.
+    wrong : int
+    cpu_seconds : float
+        Of all, its odometry included.
+    """
+
+    method: str
+    drive: str
+    scans: int
+    revisits: int
+    closed: int
+    error_m: Array
+    error_deg: Array
+    wrong: int
+    cpu_seconds: float
 
 
 def run_loops(drive: Drive, config: SgorConfig, mapper_config: MapperConfig | None = None
@@ -94,6 +135,9 @@ def run_loops(drive: Drive, config: SgorConfig, mapper_config: MapperConfig | No
     metres = np.array([translation_error_m(*pair) for pair in pairs])
     degrees = np.array([rotation_error_deg(*pair) for pair in pairs])
     way = dict(zip(stamps_ns, travelled_m(drive.T_world_sensor), strict=True))
+    wrong = (metres > WRONG_M) | (degrees > WRONG_DEG)
+    closed = {loop.source_stamp_ns for loop, is_wrong in zip(loops, wrong, strict=True)
+              if not is_wrong}
     revisits = _revisits(list(mapper.node_stamps_ns().values()), truth, way)
     before, after = (_ape(mapper, truth, loops=with_loops) for with_loops in (False, True))
     chi_squared, freedom = mapper.graph.chi_squared()
@@ -101,11 +145,38 @@ def run_loops(drive: Drive, config: SgorConfig, mapper_config: MapperConfig | No
         drive.name, len(drive), len(mapper.trajectory().stamps_ns), len(mapper.graph),
         len(mapper.keyframes), len(set(mapper.trajectory().part.tolist())),
         mapper.keyframes.nbytes / 1e6, len(revisits),
-        len(revisits & {loop.source_stamp_ns for loop in loops}), metres, degrees,
+        len(revisits & closed), loops, metres, degrees,
         np.array([nees(loop.T_target_source, T, loop.covariance)
-                  for loop, T in zip(loops, true, strict=True)]),
-        int(((metres > WRONG_M) | (degrees > WRONG_DEG)).sum()), before, after, chi_squared,
-        freedom, seconds, mapper)
+                  for loop, T in zip(loops, true, strict=True)]), _odometry_nees(mapper, truth),
+        int(wrong.sum()), before, after, chi_squared, freedom, seconds, mapper)
+
+
+def run_other(method: str, make: Callable[[], LoopCloser], drive: Drive, mapper: Mapper
+              ) -> OtherRun:
+    """Close loops by another method on a drive that the mapper was on."""
+    true = drive.T_world_sensor
+    assert true is not None
+    begin = time.process_time()
+    closer = make()
+    found = []
+    with progress(f'{drive.name}: {method}', len(drive), 'scan') as told:
+        for scan in told.over(drive):
+            found += closer(scan.read().points)
+    found += closer.finish()
+    seconds = time.process_time() - begin
+    pairs = [(loop.T_target_source, se3.inverse(true[loop.target]) @ true[loop.source])
+             for loop in found]
+    metres = np.array([translation_error_m(*pair) for pair in pairs])
+    degrees = np.array([rotation_error_deg(*pair) for pair in pairs])
+    wrong = (metres > WRONG_M) | (degrees > WRONG_DEG)
+    stamps_ns = [scan.stamp_ns for scan in drive]
+    revisits = _revisits(list(mapper.node_stamps_ns().values()),
+                         dict(zip(stamps_ns, true, strict=True)),
+                         dict(zip(stamps_ns, travelled_m(true), strict=True)))
+    closed = {stamps_ns[i] for loop, is_wrong in zip(found, wrong, strict=True) if not is_wrong
+              for i in loop.scans}
+    return OtherRun(method, drive.name, len(drive), len(revisits), len(revisits & closed), metres,
+                    degrees, int(wrong.sum()), seconds)
 
 
 def _revisits(stamps_ns: list[int], truth: dict[int, Array], way: dict[int, float]) -> set[int]:
@@ -117,6 +188,14 @@ def _revisits(stamps_ns: list[int], truth: dict[int, Array], way: dict[int, floa
         if abs(way[a] - way[b]) > ROUND_ABOUT_M + np.linalg.norm(positions[i] - positions[j]):
             found.add(max(a, b))
     return found
+
+
+def _odometry_nees(mapper: Mapper, truth: dict[int, Array]) -> Array:
+    stamp_of = mapper.node_stamps_ns()
+    return np.array([
+        nees(edge.T_target_source, se3.inverse(truth[stamp_of[edge.target]])
+             @ truth[stamp_of[edge.source]], edge.covariance)
+        for edge in mapper.graph.edges if edge.kind is Kind.ODOMETRY])
 
 
 def _ape(mapper: Mapper, truth: dict[int, Array], *, loops: bool) -> float:

@@ -46,4 +46,8 @@ def test_a_run_counts_revisits_and_errors():
     assert run.revisits <= run.nodes
     table = loop_table([run])
     assert f'| {run.closed} of {run.revisits} | {len(run.error_m)} | 0 |' in table
-    assert len(loop_records([run])) == len(run.error_m)
+    kinds = [record['kind'] for record in loop_records([run])]
+    assert kinds.count('loop') == len(run.error_m)
+    # one part: an edge for each node but the first
+    assert kinds.count('odometry') == len(run.odometry_nees) == run.nodes - 1
+    assert run.odometry_nees.mean() < 12

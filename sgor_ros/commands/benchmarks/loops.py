@@ -6,13 +6,20 @@ from pathlib import Path
 import numpy as np
 
 from ...core.common.settings import InputError
+from ...evaluation.loops import LoopRun
+from ...evaluation.loops import OtherRun
 from ...evaluation.loops import run_loops
+from ...evaluation.loops import run_other
+from ...evaluation.methods.loop_closing import loop_closers
 from ...evaluation.metrics.trajectory import require_evo
 from ...evaluation.protocols.returns import there_and_back
 from ...evaluation.report.loop_plots import plot_loops
 from ...evaluation.report.loop_table import loop_records
 from ...evaluation.report.loop_table import loop_table
+from ...evaluation.report.loop_table import OTHERS_RULE
+from ...evaluation.report.loop_table import others_table
 from ...evaluation.report.loop_table import RULE
+from ...io.datasets import Drive
 from ...mapping.map_cloud import map_cloud
 from ..scene_pairs import return_drive
 from ..scene_pairs import scene_kinds
@@ -36,6 +43,8 @@ def add_options(command: ArgumentParser) -> None:
                          'turns round and comes back')
     command.add_argument('--kinds', nargs='+', metavar='KIND', default=[STREET],
                          help='of places there; default: the street, which is no other kind')
+    command.add_argument('--others', action='store_true',
+                         help='also map-closures and KISS-SLAM, where they are installed')
 
 
 def measure(arguments: Namespace, folder: Path) -> None:
@@ -46,9 +55,17 @@ def measure(arguments: Namespace, folder: Path) -> None:
               if drive.T_world_sensor is not None and len(drive) > 1]
     if arguments.back is not None:
         drives = [there_and_back(drive, np.radians(arguments.back)) for drive in drives]
-    runs = []
-    for drive in drives:
+    makers = loop_closers(inputs.say) if arguments.others else {}
+    runs: list[LoopRun] = []
+    others: list[OtherRun] = []
+
+    def run(drive: Drive) -> None:
         runs.append(run_loops(drive.without_labels() if arguments.no_labels else drive, config))
+        others.extend(run_other(name, make, drive, runs[-1].mapper)
+                      for name, make in makers.items())
+
+    for drive in drives:
+        run(drive)
     if inputs.wants_world(arguments):
         from ...world import Lidar
         lidar = Lidar(beams=arguments.beams, label_noise=arguments.random_labels)
@@ -56,12 +73,13 @@ def measure(arguments: Namespace, folder: Path) -> None:
         for kind in arguments.kinds:
             for seed in range(arguments.seed, arguments.seed + arguments.seeds):
                 inputs.say(f'{kind}, seed {seed}: scanning')
-                drive = return_drive(kind, arguments.way, seed, lidar)
-                runs.append(run_loops(drive.without_labels() if arguments.no_labels else drive,
-                                      config))
+                run(return_drive(kind, arguments.way, seed, lidar))
     if not runs:
         raise InputError(f'{arguments.data}: no drive with two scans and poses.txt')
-    inputs.finish(arguments, folder, f'{loop_table(runs)}\n\n{RULE}', loop_records(runs))
+    parts = [loop_table(runs), RULE]
+    if others:
+        parts += [others_table(runs, others), OTHERS_RULE]
+    inputs.finish(arguments, folder, '\n\n'.join(parts), loop_records(runs))
     first = runs[0].mapper
     stamp_of, (stamps_ns, after) = first.node_stamps_ns(), first.trajectory()
     at = {stamp: i for i, stamp in enumerate(stamps_ns.tolist())}

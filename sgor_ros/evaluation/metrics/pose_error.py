@@ -6,6 +6,7 @@ from scipy.stats import chi2
 
 from ...core.common import se3
 
+NEES_95 = float(chi2.ppf(0.95, 6))
 NEES_BOUND = float(chi2.ppf(0.9973, 6))
 """The NEES of a pose stays below in as many cases as a number stays within 3 sigma."""
 
