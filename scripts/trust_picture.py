@@ -125,8 +125,8 @@ def courtyard() -> Example:
     turned = [se3.angle(T[:3, :3] @ found.T_target_source[:3, :3].T) > 0.1 for T in rivals]
     said = score_keypoints(source.index, target.index, rivals, ASKED)
     best = int(np.argmax((said == AGREES).sum(axis=1) * turned))
-    return Example(found.status, source, target, T_world_target, found.T_target_source, rivals[best],
-                   (0.0, 0.0))
+    return Example(found.status, source, target, T_world_target, found.T_target_source,
+                   rivals[best], (0.0, 0.0))
 
 
 def _middle(T_world_target: Array, *placements: Array) -> tuple[float, float]:
