@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.index.range_image import view_overlap
 from ..core.prepared_scan import PreparedScan
 from .config import MapperConfig
 from .keyframe import Keyframes
@@ -21,6 +22,9 @@ SIGMAS = 3.0
 ROUND_ABOUT = 2
 """To a neighbour one drives straight; to a loop leads a way that is longer by so many keyframes.
 """
+
+SAME_VIEW = 0.5
+"""Share of a view that a keyframe has to see too, to cover it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,10 +111,17 @@ class Surroundings:
         return list(dict.fromkeys(chosen))
 
     def is_covered(self) -> bool:
-        """Return whether a keyframe stands so near that another would add nothing."""
+        """Return whether a keyframe stands so near that another would add nothing.
+
+        It has to look the same way, too: sensors of narrow view see something else behind.
+        """
         spacing = self.config.keyframe_spacing * self.prepared.scale
-        return any(distance < spacing and sigma < spacing / 2
-                   for _, distance, sigma in self._distances)
+        R_map_sensor = self.graph.pose(self.node.id)[:3, :3]
+        return any(
+            distance < spacing and sigma < spacing / 2 and view_overlap(
+                self.prepared.index.ranges, self.graph.pose(other)[:3, :3].T @ R_map_sensor
+            ) >= SAME_VIEW
+            for other, distance, sigma in self._distances)
 
     @cached_property
     def _others(self) -> list[int]:

@@ -336,7 +336,7 @@ def shift(matches):
 def test_the_command_with_a_method_of_ones_own(tmp_path):
     """Killed while it runs and started again: it ends, with pictures and all rows."""
     (tmp_path / 'mine.py').write_text(OWN)
-    command = [sys.executable, '-m', 'sgor_ros.commands.tables', 'strides', '--scans', '12',
+    command = [sys.executable, '-m', 'sgor_ros.commands.tables', 'strides', '--scans', '7',
                '--strides', '3', '--limit', '4', '--methods', 'SGOR', 'SM', '--method',
                'mine:shift', '--output', 'out']
     path = tmp_path / 'out/pairs.csv'

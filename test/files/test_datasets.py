@@ -293,6 +293,16 @@ def test_each_lidar_of_helipr(street, tmp_path):
     assert one.T_world_sensor is not None
 
 
+def test_scans_of_helipr_may_be_links(street, tmp_path):
+    write_helipr(tmp_path / 'disk', street, 'Avia', 19)
+    kept = tmp_path / 'here/LiDAR/Avia'
+    kept.mkdir(parents=True)
+    for i, scan in enumerate(sorted((tmp_path / 'disk/LiDAR/Avia').iterdir())):
+        scan.rename(tmp_path / f'disk/{i}.raw')
+        (kept / scan.name).symlink_to(tmp_path / f'disk/{i}.raw')
+    np.testing.assert_array_equal(open_drive(kept).read(2).points, street[2][0])
+
+
 def test_early_scans_of_the_aeva_are_shorter(street, tmp_path):
     drive = open_drive(write_helipr(tmp_path, street, 'Aeva', 25))
     np.testing.assert_array_equal(drive.read(0).points, street[0][0])

@@ -158,7 +158,7 @@ DOORS = {
     'sqlite3': Door('a.db3', seeds.sqlites, _bag),
     'packed_messages': Door('a.db3', seeds.packed_messages, _bag),
     'packed_file': Door('bag.db3.zstd', lambda: [seeds.packed_files()['bag.db3.zstd']],
-                        partial(_bag, folder=True),
+                        partial(_bag, folder=True), partial(seeds.made_packed_file, mutated),
                         beside=lambda: {'metadata.yaml': seeds.packed_files()['metadata.yaml']}),
     'ros1': Door('a.bag', seeds.bags, _bag),
     'metadata': Door('metadata.yaml', seeds.metadatas, partial(_bag, folder=True),

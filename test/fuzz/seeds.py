@@ -21,6 +21,7 @@ from sgor_ros.core.compact_scan import compact
 from sgor_ros.core.preprocessing import preprocess
 from sgor_ros.core.scan.labels import TABLES
 from sgor_ros.core.scan.scan import SemanticScan
+from sgor_ros.io.bags import zstd  # of Python or of its backport
 from sgor_ros.io.compact_scans import write_compact_scan
 from sgor_ros.io.messages import point_cloud2
 
@@ -259,6 +260,7 @@ def mcaps():
                         fmt=CompressionFormat.ZSTD), '.mcap')]
 
 
+@cache
 def sqlites():
     return [_file(_bag2(StoragePlugin.SQLITE3), '.db3')]
 
@@ -272,6 +274,11 @@ def packed_messages():
 @cache
 def packed_files():
     return _bag2(StoragePlugin.SQLITE3, mode=CompressionMode.FILE, fmt=CompressionFormat.ZSTD)
+
+
+def made_packed_file(mutate, rng):
+    """Return a file that is packed well, of a bag that is spoilt."""
+    return zstd.compress(mutate(sqlites()[0], sqlites(), rng))
 
 
 def metadatas():

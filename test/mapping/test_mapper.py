@@ -110,6 +110,30 @@ def test_space_that_is_covered_costs_no_memory(there_again):
     assert len(mapper.keyframes) <= there + 1 < nodes - 3
 
 
+def test_a_narrow_view_covers_only_what_it_sees(drive):
+    """Of a sensor that looks ahead the way back is another view, and closes loops later."""
+    def ahead(scan):
+        seen = np.abs(np.arctan2(scan.points[:, 1], scan.points[:, 0])) < np.radians(60)
+        return SemanticScan(scan.points[seen], scan.labels[seen])
+
+    narrow = [(ahead(scan), T) for scan, T in drive]
+    mapper = Mapper()
+    tracked = mapped(mapper, narrow)
+    back = [i for i, scan in enumerate(tracked[THERE + TURN:], THERE + TURN) if scan.keyframe]
+    kept = {one.stamp_ns for one in mapper.keyframes}
+    assert len(back) >= 3
+    assert len([i for i in back if tracked[i].stamp_ns in kept]) >= len(back) - 1
+    again = mapped(mapper, narrow[THERE + TURN:], len(drive))
+    loops = [loop for scan in again for loop in scan.loops]
+    assert len(loops) >= 2
+    truth = [T for _, T in [*narrow, *narrow[THERE + TURN:]]]
+    for loop in loops:
+        metres, degrees = errors(loop.T_target_source, relative(
+            truth[loop.target_stamp_ns // PERIOD_NS], truth[loop.source_stamp_ns // PERIOD_NS]))
+        assert metres < 0.2
+        assert degrees < 1.0
+
+
 def test_ten_false_loops_move_nothing(drive, there_again):
     mapper, tracked = there_again
     before = mapper.trajectory().T_map_sensor

@@ -42,8 +42,8 @@ def test_messages_that_leave_the_queue_unacknowledged_are_counted(domain):
                 publisher.publish(String(data=str(number)))
                 time.sleep(pause_s)
 
-        for _ in range(3 * DEPTH):
-            publish(1, 0.0)
+        for _ in range(6):    # fewer at once than the queue holds
+            publish(DEPTH // 2, 0.0)
             until_acknowledged(publisher)
         assert edges.overdue == 0
         slow.send_signal(signal.SIGSTOP)

@@ -24,6 +24,7 @@ import yaml
 from sgor_ros import SgorConfig
 from sgor_ros import TrackerConfig
 from sgor_ros.io.messages import matrix_of
+from sgor_ros.ros.parameters import MAP_FOLDER
 from sgor_ros.ros.parameters import NodeConfig
 from sgor_ros.ros.parameters import yaml_files
 from sgor_ros.ros.playback.node_process import NodeProcess
@@ -223,7 +224,8 @@ def test_parameters_carry_meaning_unit_and_range(partner):
         limits = [*descriptor.floating_point_range, *descriptor.integer_range]
         assert [(x.from_value, x.to_value) for x in limits] == (
             [] if item.minimum is None else [(item.minimum, item.maximum)])
-        assert descriptor.read_only == (item.name in NodeConfig.__dataclass_fields__)
+        assert descriptor.read_only == (item.name in NodeConfig.__dataclass_fields__
+                                        and item.name != MAP_FOLDER)
 
 
 def test_settings_for_studies_are_parameters_only_where_they_are_given(partner):

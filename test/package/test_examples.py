@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 
 from sgor_ros.world import Lidar
+from sgor_ros.world import loop_trajectory
 from sgor_ros.world import simulate
+from sgor_ros.world import street_scene
 
 EXAMPLES = Path(__file__).resolve().parents[2] / 'examples'
 TESTED = {'bag', 'label_convention', 'loops', 'maps', 'own_features', 'own_labels',
@@ -28,8 +30,7 @@ def example(name):
 @pytest.fixture(scope='module')
 def street_poses():
     """Return where the scans of the examples were really taken."""
-    return {speed: [pose for *_, pose in simulate(5, seed=0, speed=speed)]
-            for speed in (40.0, 60.0, 6.0)}
+    return {speed: loop_trajectory(street_scene(0), 5, speed) for speed in (40.0, 60.0, 6.0)}
 
 
 def test_all_examples_are_tested():

@@ -48,15 +48,14 @@ def correlate_maps(source: ScanIndex, target: ScanIndex, T_target_source: NDArra
                  np.stack((bev.cells[:, ::2], bev.cells[:, 1::2])), half, hits)
     # the pose itself is no other
     hits[0, half - 1:half + 2, half - 1:half + 2] = 0
-    peaks = _peaks(hits, PEAKS)
-    found = np.empty((len(peaks), 4, 4))
-    for k, (turn, i, j) in enumerate(peaks):
-        about = _quarter(turn)
-        shift = 2 * bev.edge * np.array([i - half, j - half, 0])
-        move = se3.compose(target.axes.T @ about @ target.axes,
-                           target.axes.T @ (sensor - about @ sensor + shift))
-        found[k] = move @ T_target_source
-    return found
+    peaks = np.array(_peaks(hits, PEAKS), np.int64).reshape(-1, 3)
+    about = np.array([_quarter(turn) for turn in range(TURNS)])[peaks[:, 0]]
+    shifts = np.zeros((len(peaks), 3))
+    shifts[:, :2] = 2 * bev.edge * (peaks[:, 1:] - half)
+    moves = np.tile(np.eye(4), (len(peaks), 1, 1))
+    moves[:, :3, :3] = target.axes.T @ about @ target.axes
+    moves[:, :3, 3] = (sensor - about @ sensor + shifts) @ target.axes
+    return moves @ T_target_source
 
 
 def _normal_space_sample(sectors: NDArray[np.int64], most: int) -> NDArray[np.intp]:
@@ -65,14 +64,15 @@ def _normal_space_sample(sectors: NDArray[np.int64], most: int) -> NDArray[np.in
     Normal-space sampling (Rusinkiewicz and Levoy 2001): along a wall only the few surfaces that
     face along it tell one place from the next.
     """
-    present, counts = np.unique(sectors, return_counts=True)
-    share = np.zeros(len(present), np.int64)
-    for at in np.argsort(counts):    # what the small ones leave is for the others
-        open_ = len(present) - int((share > 0).sum())
-        share[at] = min(counts[at], -(-(most - share.sum()) // open_))
-    rows = [np.flatnonzero(sectors == sector)[thin(int(count), int(part))]
-            for sector, count, part in zip(present, counts, share, strict=True) if part]
-    return np.sort(np.concatenate(rows)) if rows else np.zeros(0, np.intp)
+    in_sectors = np.argsort(sectors, kind='stable')
+    _, counts = np.unique(sectors, return_counts=True)
+    members = np.split(in_sectors, np.cumsum(counts)[:-1])
+    rows, left = [np.zeros(0, np.intp)], most
+    for at, one in enumerate(sorted(members, key=len)):    # what small ones leave is for others
+        share = min(len(one), -(-left // (len(members) - at)))
+        rows.append(one[thin(len(one), share)])
+        left -= share
+    return np.sort(np.concatenate(rows))
 
 
 def _quarter(turn: int) -> NDArray[np.float64]:

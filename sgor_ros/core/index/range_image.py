@@ -1,11 +1,17 @@
 """The range image of one scan: how far it has seen in each direction."""
+import math
+
 import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.products import times_transposed
 from ..scan.directions import AZIMUTHS
 from ..scan.directions import ELEVATIONS
 from ..scan.directions import Rays
+
+BLOCK = 15
+"""Cells along the edge of the blocks by which views are compared, wider than beams lie apart."""
 
 
 def range_image(rays: Rays, kept: NDArray[np.bool_]) -> NDArray[np.float32]:
@@ -15,6 +21,32 @@ def range_image(rays: Rays, kept: NDArray[np.bool_]) -> NDArray[np.float32]:
     """
     return _shortest_around(_nearest(rays.first, rays.ranges, rays.order, kept).reshape(
         AZIMUTHS, ELEVATIONS))
+
+
+def view_overlap(ranges: NDArray[np.float32], R_other_sensor: NDArray[np.float64]) -> float:
+    """Return the share of what a sensor sees that it would see too if it were turned, 0 to 1.
+
+    All of it for one that spins, whatever its yaw; less the farther one of narrow view is turned.
+
+    Parameters
+    ----------
+    ranges : (360, 180) float32
+        Its `range_image`.
+    R_other_sensor : (3, 3) float64
+        From the one orientation to the other.
+    """
+    seen = np.isfinite(ranges).reshape(AZIMUTHS // BLOCK, BLOCK, ELEVATIONS // BLOCK, BLOCK).any(
+        axis=(1, 3))
+    rows, columns = np.nonzero(seen)
+    azimuth = ((rows + 0.5) * BLOCK / AZIMUTHS - 0.5) * 2 * math.pi
+    elevation = ((columns + 0.5) * BLOCK / ELEVATIONS - 0.5) * math.pi
+    ways = np.column_stack((np.cos(elevation) * np.cos(azimuth),
+                            np.cos(elevation) * np.sin(azimuth), np.sin(elevation)))
+    x, y, z = times_transposed(ways, R_other_sensor).T
+    turned = np.floor((np.arctan2(y, x) / (2 * math.pi) + 0.5) * AZIMUTHS / BLOCK).astype(int)
+    tilted = np.floor((np.arcsin(np.clip(z, -1, 1)) / math.pi + 0.5) * ELEVATIONS / BLOCK)
+    tilted = np.minimum(tilted, seen.shape[1] - 1).astype(int)
+    return float(seen[turned % len(seen), tilted].mean())
 
 
 @numba.njit(cache=True, nogil=True)

@@ -11,6 +11,8 @@ from ..execution.threads import parallel_for
 
 AZIMUTHS, ELEVATIONS = 360, 180
 """Cells around and from below to above: 1 degree, wider than the gaps between most beams."""
+AROUND, UP_AND_DOWN = np.float32(1 / (2 * math.pi)), np.float32(1 / math.pi)
+HALF = np.float32(0.5)
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,15 +45,19 @@ def by_direction(points: NDArray[np.float32]) -> Rays:
 @numba.njit(cache=True, nogil=True, inline='always')
 def direction(x, y, z):
     """Return the cell, by azimuth and elevation, that a point is seen in."""
-    azimuth = int((atan2(y, x) / (2 * math.pi) + 0.5) * AZIMUTHS)
-    elevation = int((atan2(z, math.sqrt(x * x + y * y)) / math.pi + 0.5) * ELEVATIONS)
-    return min(max(azimuth, 0), AZIMUTHS - 1), min(max(elevation, 0), ELEVATIONS - 1)
+    azimuth = np.int32((atan2(y, x) * AROUND + HALF) * np.float32(AZIMUTHS))
+    elevation = np.int32((atan2(z, math.sqrt(x * x + y * y)) * UP_AND_DOWN + HALF)
+                         * np.float32(ELEVATIONS))
+    return (min(max(azimuth, np.int32(0)), np.int32(AZIMUTHS - 1)),
+            min(max(elevation, np.int32(0)), np.int32(ELEVATIONS - 1)))
 
 
-@numba.njit(cache=True, nogil=True)
+# vector instructions need float32 throughout, a loop over a whole array, division without a check
+@numba.njit(cache=True, nogil=True, error_model='numpy', fastmath={'nsz', 'nnan', 'contract'})
 def _look(begin, end, points, cells, ranges):
-    for i in range(begin, end):
-        x, y, z = points[i]
+    points, cells, ranges = points[begin:end], cells[begin:end], ranges[begin:end]
+    for i in range(len(points)):
+        x, y, z = points[i, 0], points[i, 1], points[i, 2]
         azimuth, elevation = direction(x, y, z)
         cells[i] = azimuth * ELEVATIONS + elevation
         ranges[i] = math.sqrt(x * x + y * y + z * z)

@@ -3,11 +3,11 @@ from dataclasses import dataclass
 from dataclasses import replace
 from typing import Literal
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from ..common.products import scatter
-from ..common.products import times_transposed
 from ..common.products import times_vector
 from ..config import SgorConfig
 from .scan import ORIGIN
@@ -180,14 +180,17 @@ def _by_consensus(points: NDArray[np.float64], candidates: NDArray[np.float64],
     normals = np.divide(normals, length, out=np.zeros_like(normals), where=length > 0)
     offsets = -np.einsum('ij,ij->i', normals, corners[:, 0])
     told = up.direction if up is not None and up.told else None
-    flip = (_upside_down(normals, offsets, near, config) if told is None
-            else normals @ told < 0)
+    sample = _thinned(candidates)
+    on_plane, above, below = _sides(sample, normals, offsets, config.sigma_g)
+    if told is None:
+        _, over, under = (on_plane, above, below) if near is candidates else _sides(
+            _thinned(near), normals, offsets, config.sigma_g)
+        flip = under > over
+    else:
+        flip = normals @ told < 0
     normals[flip], offsets[flip] = -normals[flip], -offsets[flip]
-    sample = candidates[::max(len(candidates) // SAMPLE, 1)]
-    heights = times_transposed(sample, normals) + offsets
     # what lies below a wall or a table plane tells it from the ground
-    score = ((np.abs(heights) < config.sigma_g).sum(axis=0)
-             - 3 * (heights < -2 * config.sigma_g).sum(axis=0))
+    score = on_plane - 3 * np.where(flip, above, below)
     score[length[:, 0] == 0] = 0
     if source == 'labels':
         best, certain = int(np.argmax(score)), True
@@ -211,14 +214,29 @@ def _by_consensus(points: NDArray[np.float64], candidates: NDArray[np.float64],
                   source, certain)
 
 
-def _upside_down(normals: NDArray[np.float64], offsets: NDArray[np.float64],
-                 near: NDArray[np.float64], config: SgorConfig) -> NDArray[np.bool_]:
-    """Return which of (K, 3) normals point away from where most of the points are, (K,)."""
-    sample = near[::max(len(near) // SAMPLE, 1)]
-    heights = times_transposed(sample, normals) + offsets
-    above = (heights > 2 * config.sigma_g).sum(axis=0)
-    below: NDArray[np.intp] = (heights < -2 * config.sigma_g).sum(axis=0)
-    return np.asarray(below > above)
+def _thinned(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    return points[::max(len(points) // SAMPLE, 1)]
+
+
+def _sides(points: NDArray[np.float64], normals: NDArray[np.float64],
+           offsets: NDArray[np.float64], thickness: float) -> NDArray[np.int64]:
+    """Return how many points are on each of K planes, clearly above and clearly below: (3, K)."""
+    counts = np.empty((3, len(normals)), np.int64)
+    _count_sides(np.ascontiguousarray(points.T), normals, offsets, thickness, counts)
+    return counts
+
+
+@numba.njit(cache=True, nogil=True, fastmath={'contract', 'nsz', 'reassoc'})
+def _count_sides(xyz, normals, offsets, thickness, counts):
+    for k in range(len(normals)):
+        on = above = below = 0
+        for i in range(xyz.shape[1]):
+            height = (normals[k, 0] * xyz[0, i] + normals[k, 1] * xyz[1, i]
+                      + normals[k, 2] * xyz[2, i] + offsets[k])
+            on += abs(height) < thickness
+            above += height > 2 * thickness
+            below += height < -2 * thickness
+        counts[0, k], counts[1, k], counts[2, k] = on, above, below
 
 
 def _most_likely(normals: NDArray[np.float64], score: NDArray[np.intp], asked: int,

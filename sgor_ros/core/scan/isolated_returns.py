@@ -72,25 +72,33 @@ def _judge(begin, end, first, ranges, voxel, order, kept):
                     kept[order[i]] = True
                     continue
                 needed = min(max(round(SHARE * expected), 1), MOST)
+                depth = np.float32(DEPTH_VOXELS * voxel + DEPTH_SHARE * ranges[i])
                 kept[order[i]] = _has_neighbours(
-                    ranges[i], DEPTH_VOXELS * voxel + DEPTH_SHARE * ranges[i], azimuth, cell, low,
-                    high, needed, first, ranges)
+                    ranges[i], depth, azimuth, cell, low, high, needed, first, ranges)
 
 
 @numba.njit(cache=True, nogil=True)
 def _has_neighbours(r, depth, azimuth, cell, low, high, needed, first, ranges):
     """Return whether as many others as needed lie within a depth, asking the cell first."""
-    found = -1    # the return itself
-    for j in range(first[cell], first[cell + 1]):
-        if abs(ranges[j] - r) <= depth:
-            found += 1
-            if found >= needed:
-                return True
+    near, far = r - depth, r + depth
+    own = _count(ranges[first[cell]:first[cell + 1]], near, far)
+    found = own - 1    # without the return itself
+    if found >= needed:
+        return True
     for step in range(-1, 2):
         row = (azimuth + step) % AZIMUTHS * ELEVATIONS
-        for j in range(first[row + low], first[row + high + 1]):
-            if abs(ranges[j] - r) <= depth and not first[cell] <= j < first[cell + 1]:
-                found += 1
-                if found >= needed:
-                    return True
+        found += _count(ranges[first[row + low]:first[row + high + 1]], near, far)
+        if step == 0:
+            found -= own
+        if found >= needed:
+            return True
     return False
+
+
+@numba.njit(cache=True, nogil=True, inline='always')
+def _count(ranges, near, far):
+    """Return how many lie from near to far; without a branch, for vector instructions."""
+    count = np.int32(0)
+    for k in range(len(ranges)):
+        count += np.int32((ranges[k] >= near) & (ranges[k] <= far))
+    return count

@@ -47,16 +47,15 @@ def _drive(path: Path, name: str) -> Drive:
     stamps = stamps_of_names(scans)
     if stamps is None:
         raise InputError(f'{scans[0]}: scans of HeLiPR are named by nanoseconds')
-    drive_scans = [DriveScan(f'{name}/{scan.stem}', 'helipr', SgorConfig().label_convention,
-                    partial(_read, scan)) for scan in scans]
     sensor = path.resolve()
+    drive_scans = [DriveScan(f'{name}/{scan.stem}', 'helipr', SgorConfig().label_convention,
+                             partial(_read, scan, sensor.name)) for scan in scans]
     table = sensor.parents[1] / f'LiDAR_GT/global_{sensor.name}_gt.txt'
     return Drive(name, drive_scans, _poses(table, stamps) if table.is_file() else None,
                  stamps_ns=stamps)
 
 
-def _read(path: Path) -> SemanticScan:
-    kind = path.resolve().parent.name
+def _read(path: Path, kind: str) -> SemanticScan:
     step = (AEVA_WITHOUT_INTENSITY if kind == 'Aeva' and int(path.stem) <= AEVA_CHANGED_NS
             else BYTES_A_POINT[kind])
     raw = np.fromfile(path, np.uint8)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -32,6 +33,7 @@ class StreetScene(Scene):
     layout: Layout
 
 
+@lru_cache(maxsize=2)    # it takes seconds, and is asked for again with each drive through it
 def street_scene(seed: int = 0) -> StreetScene:
     """Build a place: a loop road with side streets, houses and all that lines them.
 
