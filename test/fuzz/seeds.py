@@ -97,9 +97,7 @@ def npys():
 def arrays():
     """Return what holds a scan in memory: (N, 3), (N, 4), fields as of ROS."""
     fields = np.zeros(12, [(axis, '<f4') for axis in 'xyz'] + [('label', '<u4')])
-    for axis, column in zip('xyz', POINTS.T, strict=True):
-        fields[axis] = column
-    fields['label'] = LABELS
+    fields['x'], fields['y'], fields['z'], fields['label'] = *POINTS.T, LABELS
     return [_npy(array) for array in (POINTS, np.hstack((POINTS, POINTS[:, :1])), fields)]
 
 
