@@ -5,15 +5,12 @@
 Stopped, it goes on where it was. What it runs is the list below, each a call of `sgor_tables`.
 """
 from pathlib import Path
-import re
-import shutil
 import sys
 
 from sgor_ros.commands import tables
 
 OUT = Path('out/results')
 QUICK = ['--methods', 'SGOR', 'SC2-PCR', 'SM']
-PICTURED = ('poses_paper', 'matches', 'noise', 'categories')
 HEAD = """# Results
 
 Made by `scripts/results_page.py` from runs of [`sgor_tables`](tables.md) on what little data is at
@@ -56,7 +53,7 @@ def runs(data: Path, drives: Path) -> dict[str, tuple[str, list[str]]]:
 
 
 def main() -> None:
-    """Run what is missing, and write the page and its pictures."""
+    """Run what is missing, and write the page, without pictures: lines of ten pairs say little."""
     data, drives, docs = map(Path, sys.argv[1:4])
     text = [HEAD]
     for name, (title, arguments) in runs(data, drives).items():
@@ -66,12 +63,7 @@ def main() -> None:
         page = (folder / 'results.md').read_text()
         body = '\n'.join(line for line in page.splitlines()
                          if ', printed |' not in line and not line.startswith(('# ', '![')))
-        picture = re.search(r'!\[(study|matches)\.png]', page)
         text.append(f'## {title}\n\n{body.strip()}')
-        if picture and name in PICTURED:
-            target = docs / f'images/results_{name}.png'
-            shutil.copyfile(folder / f'{picture[1]}.png', target)
-            text.append(f'![{title}](images/{target.name})')
     (docs / 'results.md').write_text('\n\n'.join(text) + '\n')
 
 

@@ -16,6 +16,7 @@ from sgor_ros import PreparedScan
 from sgor_ros import preprocess
 from sgor_ros import register
 from sgor_ros import SemanticScan
+from sgor_ros import Status
 from sgor_ros.core.common import se3
 from sgor_ros.core.degeneracy.directions import perturbed_poses
 from sgor_ros.core.hypotheses.map_correlation import correlate_maps
@@ -46,8 +47,9 @@ ASPECT = 0.62
 
 @dataclass(frozen=True, eq=False)
 class Example:
-    """A pair, its answer and another placement (T_target_source), and what to look at [m]."""
+    """A pair, what `register` says, its answer, another placement, and what to look at [m]."""
 
+    status: Status
     source: PreparedScan
     target: PreparedScan
     T_world_target: Array
@@ -61,13 +63,14 @@ def main() -> None:
     figure = Figure(figsize=(12, 6.4), layout='constrained')
     grid = figure.subplots(2, 3)
     columns = (
-        (tunnel(), 40.0, 'Tunnel: degenerate', f'slid by {SLID_M:.0f} m: not ruled out'),
-        (facade(), 48.0, 'Facade in bays: ambiguous', 'one bay further: not ruled out'),
-        (courtyard(), 32.0, 'Courtyard: one answer', 'turned by half: ruled out'))
+        (tunnel(), 40.0, 'Tunnel', f'slid by {SLID_M:.0f} m: not ruled out'),
+        (facade(), 48.0, 'Facade in bays', 'one bay further: not ruled out'),
+        (courtyard(), 32.0, 'Courtyard', 'turned by half: ruled out'))
     for (top, bottom), (example, width, title, change) in zip(grid.T, columns, strict=True):
         draw(top, example, example.answer, width)
         draw(bottom, example, example.other, width)
-        top.set_title(title, weight='bold', fontsize=13, pad=10)
+        top.set_title(f'{title}: {example.status.name.lower()}', weight='bold', fontsize=13,
+                      pad=10)
         bottom.set_title(change, fontsize=12)
     slide_arrow(grid[0, 0], columns[0][0])
     grid[0, 0].set_ylabel('the answer', fontsize=12)
@@ -100,7 +103,7 @@ def tunnel() -> Example:
     slide = SLID_M * found.alternatives[0].degenerate[:1]
     slid = icp(source.index, target.index, perturbed_poses(found.T_target_source, slide), ROUNDS,
                ROUNDS)
-    return Example(source, target, T_world_target, found.T_target_source, slid[0],
+    return Example(found.status, source, target, T_world_target, found.T_target_source, slid[0],
                    _middle(T_world_target, found.T_target_source, slid[0]))
 
 
@@ -109,7 +112,7 @@ def facade() -> Example:
     source, target, T_world_target = pair_of('facade_cars_regular', 2)
     found = register(source, target)
     other = found.alternatives[0].T_target_source
-    return Example(source, target, T_world_target, found.T_target_source, other,
+    return Example(found.status, source, target, T_world_target, found.T_target_source, other,
                    _middle(T_world_target, found.T_target_source, other))
 
 
@@ -122,7 +125,8 @@ def courtyard() -> Example:
     turned = [se3.angle(T[:3, :3] @ found.T_target_source[:3, :3].T) > 0.1 for T in rivals]
     said = score_keypoints(source.index, target.index, rivals, ASKED)
     best = int(np.argmax((said == AGREES).sum(axis=1) * turned))
-    return Example(source, target, T_world_target, found.T_target_source, rivals[best], (0.0, 0.0))
+    return Example(found.status, source, target, T_world_target, found.T_target_source,
+                   rivals[best], (0.0, 0.0))
 
 
 def _middle(T_world_target: Array, *placements: Array) -> tuple[float, float]:

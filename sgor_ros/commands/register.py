@@ -150,7 +150,7 @@ def _plot(arguments: Namespace, source: SemanticScan, target: SemanticScan,
 
 
 def _short(path: Path) -> str:
-    return '/'.join(path.resolve().parts[-3:])
+    return str(Path(*path.parts[-3:]))    # as the user named it, not where that lies
 
 
 if __name__ == '__main__':

@@ -15,6 +15,7 @@ from sgor_ros.commands.options import read_parameters
 from sgor_ros.core.config import SgorConfig
 from sgor_ros.core.registration import register
 from sgor_ros.core.scan.labels import label_convention
+from sgor_ros.core.scan.scan import SemanticScan
 from sgor_ros.io.bags import BagReader
 from sgor_ros.io.broken import readable
 from sgor_ros.io.compact_scans import read_compact_scan
@@ -69,6 +70,13 @@ def _scan(scan):
         assert scan.labels.shape == (len(scan),)
         # any ids may be looked up
         label_convention('semantickitti').decode(scan.labels)
+
+
+def _array(path):
+    with readable(path):
+        array = np.load(path, allow_pickle=False)
+    _scan(SemanticScan(array))
+    register(array, array)
 
 
 def _cloud(path):
@@ -133,6 +141,7 @@ def _times(path):
 
 DOORS = {
     'cloud': Door('cloud.cdr', seeds.clouds, _cloud, seeds.made_cloud),
+    'array': Door('a.npy', seeds.arrays, _array, seeds.made_array),
     'bin': Door('a.bin', seeds.bins, lambda path: _scan(read_scan(path))),
     'label': Door('a.label', seeds.labels, _label_file),
     'npz': Door('a.npz', seeds.npzs, lambda path: _scan(read_scan(path)),
@@ -147,6 +156,10 @@ DOORS = {
     'parameter_yaml': Door('a.yaml', seeds.parameter_yamls, _parameters),
     'mcap': Door('a.mcap', seeds.mcaps, _bag),
     'sqlite3': Door('a.db3', seeds.sqlites, _bag),
+    'packed_messages': Door('a.db3', seeds.packed_messages, _bag),
+    'packed_file': Door('bag.db3.zstd', lambda: [seeds.packed_files()['bag.db3.zstd']],
+                        partial(_bag, folder=True), partial(seeds.made_packed_file, mutated),
+                        beside=lambda: {'metadata.yaml': seeds.packed_files()['metadata.yaml']}),
     'ros1': Door('a.bag', seeds.bags, _bag),
     'metadata': Door('metadata.yaml', seeds.metadatas, partial(_bag, folder=True),
                      beside=lambda: {'bag.mcap': seeds.mcaps()[0]}),

@@ -21,6 +21,7 @@ from sgor_ros.core.compact_scan import compact
 from sgor_ros.core.preprocessing import preprocess
 from sgor_ros.core.scan.labels import TABLES
 from sgor_ros.core.scan.scan import SemanticScan
+from sgor_ros.io.bags import zstd  # of Python or of its backport
 from sgor_ros.io.compact_scans import write_compact_scan
 from sgor_ros.io.messages import point_cloud2
 
@@ -91,6 +92,33 @@ def npys():
         np.save(file, array)
         found.append(file.getvalue())
     return found
+
+
+def arrays():
+    """Return what holds a scan in memory: (N, 3), (N, 4), fields as of ROS."""
+    fields = np.zeros(12, [(axis, '<f4') for axis in 'xyz'] + [('label', '<u4')])
+    fields['x'], fields['y'], fields['z'], fields['label'] = *POINTS.T, LABELS
+    return [_npy(array) for array in (POINTS, np.hstack((POINTS, POINTS[:, :1])), fields)]
+
+
+def made_array(rng):
+    """Return an array of any types, fields and shape, of any bytes."""
+    types = ('<f4', '>f4', '<f8', '<f2', 'u1', '<u4', '<i8', '<u8', '?', '<c8', 'S3', '<U2',
+             '<M8[s]', '<m8[s]', '(2,)<f4', '(0,)<f4')
+    names = rng.sample(('x', 'y', 'z', 'label', 'class_id', 'ring'), rng.randrange(1, 7))
+    if rng.random() < 0.7:
+        names = list(dict.fromkeys([*'xyz', *names]))
+    kind = np.dtype([(name, rng.choice(types[:4] if rng.random() < 0.8 else types))
+                     for name in names] if rng.random() < 0.7 else rng.choice(types))
+    shape = rng.choice(((12,), (3, 4), (12, 3), (12, 4), (4, 4), (0, 3), (), (2, 3, 2), (1, 3)))
+    size = int(np.prod(shape)) * kind.itemsize
+    return _npy(np.ndarray(shape, kind, rng.randbytes(size) + bytes(16)))
+
+
+def _npy(array):
+    file = io.BytesIO()
+    np.save(file, array)
+    return file.getvalue()
 
 
 def made_npz(mutate, rng):
@@ -230,8 +258,25 @@ def mcaps():
                         fmt=CompressionFormat.ZSTD), '.mcap')]
 
 
+@cache
 def sqlites():
     return [_file(_bag2(StoragePlugin.SQLITE3), '.db3')]
+
+
+@cache
+def packed_messages():
+    return [_file(_bag2(StoragePlugin.SQLITE3, mode=CompressionMode.MESSAGE,
+                        fmt=CompressionFormat.ZSTD), '.db3')]
+
+
+@cache
+def packed_files():
+    return _bag2(StoragePlugin.SQLITE3, mode=CompressionMode.FILE, fmt=CompressionFormat.ZSTD)
+
+
+def made_packed_file(mutate, rng):
+    """Return a file that is packed well, of a bag that is spoilt."""
+    return zstd.compress(mutate(sqlites()[0], sqlites(), rng))
 
 
 def metadatas():
