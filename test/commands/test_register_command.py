@@ -131,6 +131,16 @@ def test_pictures_of_other_kinds(pair, tmp_path, ending):
     assert (tmp_path / f'r.{ending}').read_bytes()[:5] in (b'%PDF-', b'<?xml')
 
 
+def test_a_picture_is_titled_by_the_files_as_they_were_named(pair, tmp_path, monkeypatch):
+    """Not by where links lead."""
+    for name, file in zip(('now.npz', 'before.npz'), pair[:2], strict=True):
+        (tmp_path / name).symlink_to(file)
+    monkeypatch.chdir(tmp_path)
+    assert main(['now.npz', 'before.npz', '--plot', 'pair.svg']) == 0
+    # letters are drawn as curves, and named in a comment
+    assert '<!-- now.npz to before.npz: registered,' in (tmp_path / 'pair.svg').read_text()
+
+
 @pytest.mark.parametrize('content', ['- a list', 'a: 1', '/**: {ros__parameters: 3}', '{',
                                      'a: 2020-13-45', '[' * 9999])
 def test_bad_params_files(pair, tmp_path, capsys, content):

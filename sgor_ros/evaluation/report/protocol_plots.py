@@ -3,6 +3,7 @@ from collections.abc import Mapping
 from collections.abc import Sequence
 from pathlib import Path
 
+from matplotlib.lines import Line2D
 import numpy as np
 
 from ...core.common import se3
@@ -14,7 +15,7 @@ from ..metrics.row import Row
 from ..metrics.row import Threshold
 from .protocol_tables import by_method
 
-RIGHT, WRONG = '#2a9d5c', '#c1121f'
+RIGHT, WRONG, POINTS = '#009e73', '#d55e00', '#888888'
 SHOWN = 400
 """Lines of a picture of matches: more are a blot."""
 COLOURS = ('#0072b2', '#d55e00', '#009e73', '#cc79a7', '#e69f00', '#56b4e9', '#555555', '#000000')
@@ -63,7 +64,7 @@ def errors(path: Path, rows: Sequence[Row], threshold: Threshold) -> None:
 
 def matches_before_and_after(path: Path, T_target_source: np.ndarray, matches: Matches,
                              answers: Mapping[str, Answer]) -> None:
-    """Draw the matches given and those that each method kept; right ones green, wrong ones red."""
+    """Draw the matches given and those that each method kept, right ones apart from wrong ones."""
     figure = new_figure(3.4 * (1 + len(answers)), 4.6)
     every = np.arange(len(matches.source))
     true = _fitting(matches, T_target_source)
@@ -77,14 +78,19 @@ def matches_before_and_after(path: Path, T_target_source: np.ndarray, matches: M
         p = matches.source[:, :2]
         q = se3.transform(se3.inverse(T_target_source), matches.target)[:, :2] + aside
         for cloud in (p, q):
-            axes.plot(*cloud[::4].T, ',', color='#999999')
+            axes.plot(*cloud.T, '.', color=POINTS, ms=1.5, mew=0)
         for is_true, colour in ((False, WRONG), (True, RIGHT)):
             some = shown[true[shown] == is_true]
             axes.plot(np.stack((p[some, 0], q[some, 0])), np.stack((p[some, 1], q[some, 1])),
-                      '-', color=colour, lw=0.5)
+                      '-', color=colour, lw=0.6)
         axes.set_title(f'{name}\n{true[rows].sum()} of {len(rows)} right', fontsize=9)
         axes.set_aspect('equal')
         axes.set_axis_off()
+    figure.legend(handles=[
+        Line2D([], [], color=POINTS, marker='.', ls='', label='matched points, target above'),
+        Line2D([], [], color=RIGHT, label='right match'),
+        Line2D([], [], color=WRONG, label='wrong match')], loc='outside lower center', ncols=3,
+        frameon=False)
     save(figure, path)
 
 
