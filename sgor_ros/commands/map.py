@@ -23,6 +23,7 @@ from ..io.scans import read_scan
 from ..io.stream_config import StreamConfig
 from ..io.writing import check_file
 from ..io.writing import new_file
+from ..io.writing import STDOUT
 from ..mapping import Located
 from ..mapping import Map
 from ..mapping import Mapper
@@ -92,14 +93,18 @@ def build(arguments: Namespace) -> int:
 
 def locate(arguments: Namespace) -> int:
     """Find a scan in a map and tell where it was taken; 1 where it is not found."""
-    if arguments.json:
+    to_stdout = arguments.json == STDOUT
+    if arguments.json and not to_stdout:
         check_file(arguments.json, '--json')
     known = _loaded(arguments.map)
     found = _found(known, arguments)
-    print(_where(found))
-    if arguments.json:
+    document = json.dumps(_as_dict(found, arguments), indent=2) + '\n'
+    print(_where(found), file=sys.stderr if to_stdout else sys.stdout)
+    if to_stdout:
+        sys.stdout.write(document)
+    elif arguments.json:
         with new_file(arguments.json) as place:
-            place.write_text(json.dumps(_as_dict(found, arguments), indent=2) + '\n')
+            place.write_text(document)
     return OK if found.success else FAILED
 
 
@@ -257,7 +262,7 @@ def _parser() -> Parser:
     one.add_argument('scan', type=Path, metavar='SCAN', help='.bin, .pcd, .ply or .npz')
     _add_labels(one)
     one.add_argument('-j', '--json', type=Path, metavar='FILE', help='write the result to; an '
-                     'older file is replaced')
+                     'older file is replaced; - for standard output')
     one = command(merge, 'MAP OTHER --output MAP', 'maps/yard maps/street --output maps/both')
     _add_map(one)
     one.add_argument('other', type=Path, metavar='OTHER', help='of the same place, in part')

@@ -83,6 +83,10 @@ def test_locate_tells_the_pose(work, tmp_path, capsys):
     assert told['success']
     assert errors(np.array(told['T_map_sensor']), truth(BACK + 7))[0] < 0.1
     assert np.shape(told['covariance']) == (6, 6)
+    assert main(['locate', str(work / 'map_there'), scan, '--labels', labels, '--json', '-']) == 0
+    said = capsys.readouterr()
+    assert json.loads(said.out) == told    # for a pipe: words are on standard error
+    assert 'T_map_sensor' in said.err
 
 
 def test_what_is_not_there_is_code_one(work, elsewhere, tmp_path, capsys):
