@@ -59,7 +59,7 @@ def test_no_spoilt_input_gets_past_an_input_error():
     assert done.returncode == 0, done.stdout + done.stderr
     counts = re.findall(rf'(\w+) +{COUNT} inputs: +(\d+) read, +(\d+) refused, +0 wrong',
                         done.stdout)
-    assert len(counts) == 22
+    assert len(counts) == 26
     for kind, read, refused in counts:
         assert int(read) + int(refused) == COUNT, kind
         assert int(read) > 0, f'{kind}: nothing is let in, so little is tried'

@@ -6,8 +6,10 @@ from dataclasses import dataclass
 from functools import partial
 import io
 
+import map_folders
 from mutate import mutated
 import numpy as np
+import prepared_scans
 import seeds
 
 from sgor_ros.commands.options import configured
@@ -139,6 +141,15 @@ def _times(path):
     assert stamps_ns == sorted(set(stamps_ns))
 
 
+def _map_file(name, spoil_arrays=True):
+    def good():
+        return map_folders.folder()[name]
+
+    return Door(name, lambda: [good()], map_folders.read,
+                partial(prepared_scans.made_archive, good, mutated) if spoil_arrays else None,
+                partial(map_folders.others, name))
+
+
 DOORS = {
     'cloud': Door('cloud.cdr', seeds.clouds, _cloud, seeds.made_cloud),
     'array': Door('a.npy', seeds.arrays, _array, seeds.made_array),
@@ -146,8 +157,9 @@ DOORS = {
     'label': Door('a.label', seeds.labels, _label_file),
     'npz': Door('a.npz', seeds.npzs, lambda path: _scan(read_scan(path)),
                 partial(seeds.made_npz, mutated)),
-    'compact_scan': Door('a.npz', seeds.compact_scans, _compact_scan,
-                         partial(seeds.made_compact_scan, mutated)),
+    'compact_scan': Door(
+        'a.npz', lambda: [prepared_scans.compact_scan()], _compact_scan,
+        partial(prepared_scans.made_archive, prepared_scans.compact_scan, mutated)),
     'pcd': Door('a.pcd', seeds.pcds, lambda path: _scan(read_scan(path))),
     'ply': Door('a.ply', seeds.plys, lambda path: _scan(read_scan(path))),
     'label_toml': Door('a.toml', seeds.label_tomls, _label_table),
@@ -163,6 +175,10 @@ DOORS = {
     'ros1': Door('a.bag', seeds.bags, _bag),
     'metadata': Door('metadata.yaml', seeds.metadatas, partial(_bag, folder=True),
                      beside=lambda: {'bag.mcap': seeds.mcaps()[0]}),
+    'map_index': _map_file(map_folders.INDEX, spoil_arrays=False),
+    'map_graph': _map_file(map_folders.GRAPH),
+    'map_keyframes': _map_file(map_folders.KEYFRAMES),
+    'map_scan': _map_file(map_folders.SCAN),
     'times': Door('times.txt', seeds.times, _times),
     'poses': Door('poses.txt', seeds.poses, partial(_motions, read_poses)),
     'truth': Door('truth.tum', seeds.truths, _truth),

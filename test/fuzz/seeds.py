@@ -17,12 +17,8 @@ from rosbags.typesys import get_typestore
 from rosbags.typesys import Stores
 import yaml
 
-from sgor_ros.core.compact_scan import compact
-from sgor_ros.core.preprocessing import preprocess
 from sgor_ros.core.scan.labels import TABLES
-from sgor_ros.core.scan.scan import SemanticScan
 from sgor_ros.io.bags import zstd  # of Python or of its backport
-from sgor_ros.io.compact_scans import write_compact_scan
 from sgor_ros.io.messages import point_cloud2
 
 CLOUD = 'sensor_msgs/msg/PointCloud2'
@@ -186,29 +182,6 @@ def label_jsons():
 
 def _table(text):
     return tomllib.loads(text.decode())
-
-
-def made_compact_scan(mutate, rng):
-    """Return an archive that is whole, of arrays that are not."""
-    good, file = compact_scans()[0], io.BytesIO()
-    with zipfile.ZipFile(io.BytesIO(good)) as whole, zipfile.ZipFile(file, 'w') as archive:
-        spoilt = rng.choice(whole.namelist())
-        for name in whole.namelist():
-            content = whole.read(name)
-            archive.writestr(name, mutate(content, [content], rng) if name == spoilt else content)
-    return file.getvalue()
-
-
-@cache
-def compact_scans():
-    rng = np.random.default_rng(0)
-    points = rng.uniform(-20, 20, (3000, 3))
-    points[:1500, 2] = -2.0
-    labels = np.repeat([40, 50], 1500)
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / 'a.npz'
-        write_compact_scan(path, compact(preprocess(SemanticScan(points, labels))))
-        return [path.read_bytes()]
 
 
 def parameter_yamls():

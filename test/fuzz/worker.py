@@ -58,9 +58,8 @@ def input_of(kind, seed, index, good):
 
 def fill(room, door, data):
     shutil.rmtree(room, ignore_errors=True)
-    room.mkdir()
-    (room / door.file).write_bytes(data)
-    for name, content in door.beside().items():
+    for name, content in {door.file: data, **door.beside()}.items():
+        (room / name).parent.mkdir(parents=True, exist_ok=True)
         (room / name).write_bytes(content)
 
 
