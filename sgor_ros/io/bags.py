@@ -250,8 +250,12 @@ class BagReader:
             if told != KNOWN.fielddefs[kind][1]:
                 raise InputError(f'{self.path}: its {kind} has other fields than that of ROS')
         for connection in self._reader.connections:
-            if not isinstance(connection.topic, str):    # sqlite3 keeps anything in any column
+            # sqlite3 keeps anything in any column, YAML in any place
+            if not isinstance(connection.topic, str):
                 raise InputError(f'{self.path}: {connection.topic!r} is no name of a topic')
+            if not isinstance(connection.msgtype, str):
+                raise InputError(f'{self.path}: {connection.topic} is of type '
+                                 f'{connection.msgtype!r}, which is no name of a type')
             if connection.msgtype == CLOUD_TYPE and connection.msgcount:
                 topics[connection.topic] = topics.get(connection.topic, 0) + connection.msgcount
         return topics

@@ -93,6 +93,17 @@ def test_a_count_in_the_metadata_that_is_none(mcap):
         read_all(mcap.parent)
 
 
+@pytest.mark.parametrize('kind', ['', '1.5', '[a]'])
+def test_a_type_in_the_metadata_that_is_no_name(mcap, kind):
+    """YAML holds whatever is written; found by fuzzing."""
+    metadata = mcap.parent / 'metadata.yaml'
+    text = metadata.read_text()
+    assert f'type: {CLOUD_TYPE}' in text
+    metadata.write_text(text.replace(f'type: {CLOUD_TYPE}', f'type: {kind}'))
+    with pytest.raises(InputError, match='which is no name of a type'):
+        read_all(mcap.parent)
+
+
 def test_a_topic_that_is_no_name(tmp_path):
     """A column of sqlite3 holds whatever is put in."""
     store = get_typestore(Stores.ROS2_JAZZY)
