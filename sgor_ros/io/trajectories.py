@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from ..core.common import se3
 from ..core.common.settings import InputError
 from .broken import readable
 
@@ -108,11 +109,9 @@ def read_timed_poses(path: str | Path) -> tuple[NDArray[np.int64] | None, NDArra
         bad = int(np.flatnonzero(~good)[0])
         raise InputError(f'{path}: line {bad + 1} of numbers is no later time with a pose: '
                          f'{_short(rows[bad])}')
-    poses = np.tile(np.eye(4), (len(rows), 1, 1))
-    poses[:, :3, :3] = Rotation.from_quat(rows[:, 4:]).as_matrix()
-    poses[:, :3, 3] = rows[:, 1:4]
     # as text: a double holds the microseconds of a date only
-    return _nanoseconds(path), poses
+    return _nanoseconds(path), se3.compose(Rotation.from_quat(rows[:, 4:]).as_matrix(),
+                                           rows[:, 1:4])
 
 
 def _nanoseconds(path: str | Path) -> NDArray[np.int64]:

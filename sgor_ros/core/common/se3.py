@@ -23,10 +23,11 @@ def inverse(T_target_source: Array) -> Array:
 
 
 def compose(R: Array, t: Array) -> Array:
-    """Put a (3, 3) rotation and a (3,) translation into a (4, 4) matrix."""
-    T = np.eye(4)
-    T[:3, :3] = R
-    T[:3, 3] = t
+    """Put (..., 3, 3) rotations and (..., 3) translations into (..., 4, 4) matrices."""
+    T = np.zeros((*np.shape(t)[:-1], 4, 4))
+    T[..., :3, :3] = R
+    T[..., :3, 3] = t
+    T[..., 3, 3] = 1.0
     return T
 
 

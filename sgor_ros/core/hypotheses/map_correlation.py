@@ -11,8 +11,10 @@ from ..index.birds_eye_view import sectors_of
 from ..index.scan_index import ScanIndex
 from ..scan.voxels import thin
 
-TURNS = 4
-"""Quarter turns: what people build repeats itself under these."""
+QUARTER_TURNS = np.array([[[cosine, -sine, 0], [sine, cosine, 0], [0, 0, 1]] for cosine, sine in
+                          ((1, 0), (0, 1), (-1, 0), (0, -1))], np.float64)
+"""About the third axis: what people build repeats itself under these."""
+TURNS = len(QUARTER_TURNS)
 KEYPOINTS, PEAKS = 200, (12, 6, 6, 6)
 """Keypoints that are swept over the map, and poses that come of each turn: along a facade the
 next window is a peak, but it is the bays that repeat."""
@@ -35,8 +37,7 @@ def correlate_maps(source: ScanIndex, target: ScanIndex, T_target_source: NDArra
     bev = target.birds_eye_view
     kinds = kinds_of(source.labels[rows], placed[:, 2], bev.edge)
     turned, bits = np.empty((TURNS, len(rows), 2)), np.empty((TURNS, len(rows)), np.uint64)
-    for turn in range(TURNS):
-        about = _quarter(turn)
+    for turn, about in enumerate(QUARTER_TURNS):
         turned[turn] = (placed[:, :2] - sensor[:2]) @ about[:2, :2].T + sensor[:2]
         bits[turn] = map_bits(kinds, sectors_of(facing @ about.T))
     columns = np.floor((turned - bev.low) / bev.edge).astype(np.int64)
@@ -49,12 +50,11 @@ def correlate_maps(source: ScanIndex, target: ScanIndex, T_target_source: NDArra
     # the pose itself is no other
     hits[0, half - 1:half + 2, half - 1:half + 2] = 0
     peaks = np.array(_peaks(hits, PEAKS), np.int64).reshape(-1, 3)
-    about = np.array([_quarter(turn) for turn in range(TURNS)])[peaks[:, 0]]
+    about = QUARTER_TURNS[peaks[:, 0]]
     shifts = np.zeros((len(peaks), 3))
     shifts[:, :2] = 2 * bev.edge * (peaks[:, 1:] - half)
-    moves = np.tile(np.eye(4), (len(peaks), 1, 1))
-    moves[:, :3, :3] = target.axes.T @ about @ target.axes
-    moves[:, :3, 3] = (sensor - about @ sensor + shifts) @ target.axes
+    moves = se3.compose(target.axes.T @ about @ target.axes,
+                        (sensor - about @ sensor + shifts) @ target.axes)
     return moves @ T_target_source
 
 
@@ -73,12 +73,6 @@ def _normal_space_sample(sectors: NDArray[np.int64], most: int) -> NDArray[np.in
         rows.append(one[thin(len(one), share)])
         left -= share
     return np.sort(np.concatenate(rows))
-
-
-def _quarter(turn: int) -> NDArray[np.float64]:
-    """Return the rotation by quarter turns about the third axis."""
-    cosine, sine = ((1, 0), (0, 1), (-1, 0), (0, -1))[turn]
-    return np.array([[cosine, -sine, 0], [sine, cosine, 0], [0, 0, 1]], np.float64)
 
 
 @numba.njit(cache=True, nogil=True)

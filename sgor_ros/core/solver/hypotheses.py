@@ -4,6 +4,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common import se3
 from ..matching.correspondences import Correspondences
 from .consistency import FilteredGroups
 
@@ -62,7 +63,5 @@ def fit_transforms(source: NDArray[np.float64], target: NDArray[np.float64],
     U, _, Vt = np.linalg.svd(np.einsum('hk,hki,hkj->hij', w, p, q, optimize=True))
     V = Vt.swapaxes(1, 2)
     V[:, :, 2] *= np.linalg.det(V @ U.swapaxes(1, 2))[:, None]    # no reflections
-    T = np.tile(np.eye(4), (len(w), 1, 1))
-    T[:, :3, :3] = V @ U.swapaxes(1, 2)
-    T[:, :3, 3] = mean_q - np.einsum('hij,hj->hi', T[:, :3, :3], mean_p)
-    return T
+    R = V @ U.swapaxes(1, 2)
+    return se3.compose(R, mean_q - np.einsum('hij,hj->hi', R, mean_p))
