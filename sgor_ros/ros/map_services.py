@@ -21,7 +21,6 @@ from scipy.spatial.transform import Rotation
 from std_srvs.srv import Trigger
 
 from ..core.common.settings import InputError
-from ..io.frames import frame_id
 from ..mapping import Located
 from ..mapping import Map
 from ..mapping import Mapper
@@ -172,10 +171,7 @@ class MapServices:
 
     def _on_initial_pose(self, message: PoseWithCovarianceStamped) -> None:
         """Look for the sensor there first, as long as it is lost."""
-        frame = frame_id(message.header.frame_id)
-        start = start_of(message)
-        if frame not in ('', self._map_frame):
-            start = f'in the frame {frame}, not in {self._map_frame}'
+        start = start_of(message, self._map_frame)
         if isinstance(start, str):
             self._log.warning(f'initialpose: {start}: ignored')
             return

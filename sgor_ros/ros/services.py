@@ -70,10 +70,7 @@ class Services:
 
     def _on_set_pose(self, message: PoseWithCovarianceStamped) -> None:
         """Begin a new track there with the next scan."""
-        frame = frame_id(message.header.frame_id)
-        start = start_of(message)
-        if frame not in ('', self._odom_frame):
-            start = f'in the frame {frame}, not in {self._odom_frame}'
+        start = start_of(message, self._odom_frame)
         if isinstance(start, str):
             self._log.warning(f'set_pose: {start}: ignored')
             return
@@ -83,8 +80,15 @@ class Services:
         self._log.info('set_pose: the next scan starts a new track there')
 
 
-def start_of(message: PoseWithCovarianceStamped) -> tuple[Array, Array] | str:
-    """Return the (4, 4) pose and (6, 6) covariance of a message, or what is wrong with it."""
+def start_of(message: PoseWithCovarianceStamped, expected_frame: str
+             ) -> tuple[Array, Array] | str:
+    """Return the (4, 4) pose and (6, 6) covariance of a message, or what is wrong with it.
+
+    A message that names no frame is of the expected one.
+    """
+    frame = frame_id(message.header.frame_id)
+    if frame not in ('', expected_frame):
+        return f'in the frame {frame}, not in {expected_frame}'
     x, q = message.pose.pose.position, message.pose.pose.orientation
     position, quaternion = np.array([x.x, x.y, x.z]), np.array([q.x, q.y, q.z, q.w])
     covariance = np.array(message.pose.covariance, np.float64).reshape(6, 6)

@@ -23,6 +23,20 @@ def as_points(points: ArrayLike, name: str, dtype: Any = np.float64) -> NDArray[
         return array if dtype is None else array.astype(dtype, copy=False)
 
 
+def as_pose(T: ArrayLike, name: str) -> NDArray[np.float64]:
+    """Return a (4, 4) rigid transformation, or say that `name` is none.
+
+    Raises
+    ------
+    InputError
+    """
+    array = np.asarray(T, np.float64)
+    if array.shape != (4, 4) or not np.isfinite(array).all() or not np.allclose(
+            array[:3, :3] @ array[:3, :3].T, np.eye(3), atol=1e-3):
+        raise InputError(f'{name}: expected a pose (4, 4)')
+    return array
+
+
 def as_numbers(values: ArrayLike, name: str) -> NDArray[Any]:
     """Return an array of integers or floats, or say what else `name` holds.
 

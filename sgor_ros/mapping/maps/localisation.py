@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from numpy.typing import NDArray
 
 from ...core.common import se3
-from ...core.common.settings import InputError
+from ...core.common.checks import as_pose
 from ...core.config import prepares_alike
 from ...core.config import SgorConfig
 from ...core.execution.threads import cores
@@ -202,7 +202,7 @@ def locate(known: 'Map', scan: Scan | ArrayLike, hint: ArrayLike | None = None) 
         prepared = given
     else:
         prepared = preprocess(given, known.config)
-    expected = None if hint is None else _checked(hint)
+    expected = None if hint is None else as_pose(hint, 'hint')
     if not len(known.keyframes):
         return Located(Status.REFUSED, 'the map has no keyframes')
     search = Search(known, prepared, expected)
@@ -261,11 +261,3 @@ def _turned(covariance: Array | None, T_map_target: Array) -> Array | None:
         return None
     J = se3.turned(T_map_target[:3, :3])
     return J @ covariance @ J.T
-
-
-def _checked(hint: ArrayLike) -> Array:
-    T = np.asarray(hint, np.float64)
-    if T.shape != (4, 4) or not np.isfinite(T).all() or not np.allclose(
-            T[:3, :3] @ T[:3, :3].T, np.eye(3), atol=1e-3):
-        raise InputError('hint: expected a pose (4, 4)')
-    return T

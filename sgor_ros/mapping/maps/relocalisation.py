@@ -6,7 +6,7 @@ from numpy.typing import ArrayLike
 from numpy.typing import NDArray
 
 from ...core.common import se3
-from ...core.common.settings import InputError
+from ...core.common.checks import as_pose
 from ...core.prepared_scan import PreparedScan
 from ...core.verdict.result import Status
 from ..edge import Edge
@@ -52,11 +52,7 @@ class Relocalisation:
         InputError
             It is no pose.
         """
-        T = np.asarray(T_map_sensor, np.float64)
-        if T.shape != (4, 4) or not np.isfinite(T).all() or not np.allclose(
-                T[:3, :3] @ T[:3, :3].T, np.eye(3), atol=1e-3):
-            raise InputError('T_map_sensor: expected a pose (4, 4)')
-        self.hint, self.hint_is_new = T, True
+        self.hint, self.hint_is_new = as_pose(T_map_sensor, 'T_map_sensor'), True
 
     def nearest_to_hint(self, nodes: list[int], T_map_sensor: Array) -> list[int]:
         """Return nodes with poses (N, 4, 4), nearest to the hint first; none without a hint."""

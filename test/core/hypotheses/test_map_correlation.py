@@ -8,8 +8,8 @@ import pytest
 from sgor_ros.core.common import se3
 from sgor_ros.core.hypotheses.map_correlation import _normal_space_sample
 from sgor_ros.core.hypotheses.map_correlation import _peaks
-from sgor_ros.core.hypotheses.map_correlation import _quarter
 from sgor_ros.core.hypotheses.map_correlation import correlate_maps
+from sgor_ros.core.hypotheses.map_correlation import QUARTER_TURNS
 
 STEP = 1.2    # metres: two cells of the map, each a maximum correspondence distance
 
@@ -124,9 +124,9 @@ def test_pillars_agree_one_pitch_apart():
 
 
 def test_quarter_turns():
-    np.testing.assert_array_equal([_quarter(k) @ [1, 0, 5] for k in range(4)],
+    np.testing.assert_array_equal([QUARTER_TURNS[k] @ [1, 0, 5] for k in range(4)],
                                   [[1, 0, 5], [0, 1, 5], [-1, 0, 5], [0, -1, 5]])
-    np.testing.assert_array_equal([_quarter(k) @ [0, 1, 5] for k in range(4)],
+    np.testing.assert_array_equal([QUARTER_TURNS[k] @ [0, 1, 5] for k in range(4)],
                                   [[0, 1, 5], [-1, 0, 5], [0, -1, 5], [1, 0, 5]])
 
 
