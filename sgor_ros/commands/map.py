@@ -2,7 +2,6 @@
 from argparse import Namespace
 from collections.abc import Callable
 from contextlib import ExitStack
-import json
 from pathlib import Path
 import sys
 from typing import Any
@@ -48,6 +47,7 @@ from .options import read_parameters
 from .replay import open_sequence
 from .replay import run_sequence
 from .replay_results import Warnings
+from .result_output import tell
 
 EXPORTS = ('.ply', '.pcd', '.yaml')
 
@@ -93,18 +93,11 @@ def build(arguments: Namespace) -> int:
 
 def locate(arguments: Namespace) -> int:
     """Find a scan in a map and tell where it was taken; 1 where it is not found."""
-    to_stdout = arguments.json == STDOUT
-    if arguments.json and not to_stdout:
+    if arguments.json not in (None, STDOUT):
         check_file(arguments.json, '--json')
     known = _loaded(arguments.map)
     found = _found(known, arguments)
-    document = json.dumps(_as_dict(found, arguments), indent=2) + '\n'
-    print(_where(found), file=sys.stderr if to_stdout else sys.stdout)
-    if to_stdout:
-        sys.stdout.write(document)
-    elif arguments.json:
-        with new_file(arguments.json) as place:
-            place.write_text(document)
+    tell(_where(found), _as_dict(found, arguments), arguments.json)
     return OK if found.success else FAILED
 
 

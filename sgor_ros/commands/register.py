@@ -1,7 +1,6 @@
 """`sgor_register`: two scans from files, the transformation between them."""
 from argparse import Namespace
 from dataclasses import replace
-import json
 import math
 from pathlib import Path
 import sys
@@ -22,7 +21,6 @@ from ..io.plots import PICTURES
 from ..io.plots import plot_registration
 from ..io.scans import read_scan
 from ..io.writing import check_file
-from ..io.writing import new_file
 from ..io.writing import STDOUT
 from .command_line import FAILED
 from .command_line import OK
@@ -35,6 +33,7 @@ from .options import add_visualize
 from .options import configured
 from .options import PRESETS
 from .options import read_parameters
+from .result_output import tell
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -62,15 +61,8 @@ def register_files(arguments: Namespace) -> int:
         **result.timings, 'preprocessing': preprocessing + result.timings['preprocessing']})
     for warning in result.warnings:
         print(f'warning: {warning}', file=sys.stderr)
-    document = json.dumps({'source': str(arguments.source), 'target': str(arguments.target),
-                           **result.to_dict()}, indent=2) + '\n'
-    to_stdout = arguments.json == STDOUT
-    print(_text(result), file=sys.stderr if to_stdout else sys.stdout)
-    if to_stdout:
-        sys.stdout.write(document)
-    elif arguments.json:
-        with new_file(arguments.json) as place:
-            place.write_text(document)
+    tell(_text(result), {'source': str(arguments.source), 'target': str(arguments.target),
+                         **result.to_dict()}, arguments.json)
     if arguments.plot:
         _plot(arguments, source, target, result)
     if arguments.visualize is not None:
