@@ -132,13 +132,10 @@ def run_loops(drive: Drive, config: SgorConfig, mapper_config: MapperConfig | No
     true = [se3.inverse(truth[loop.target_stamp_ns]) @ truth[loop.source_stamp_ns]
             for loop in loops]
     pairs = [(loop.T_target_source, T) for loop, T in zip(loops, true, strict=True)]
-    metres = np.array([translation_error_m(*pair) for pair in pairs])
-    degrees = np.array([rotation_error_deg(*pair) for pair in pairs])
-    way = dict(zip(stamps_ns, travelled_m(drive.T_world_sensor), strict=True))
-    wrong = (metres > WRONG_M) | (degrees > WRONG_DEG)
+    metres, degrees, wrong = _judged(pairs)
     closed = {loop.source_stamp_ns for loop, is_wrong in zip(loops, wrong, strict=True)
               if not is_wrong}
-    revisits = _revisits(list(mapper.node_stamps_ns().values()), truth, way)
+    revisits = _revisits(mapper, drive)
     before, after = (_ape(mapper, truth, loops=with_loops) for with_loops in (False, True))
     chi_squared, freedom = mapper.graph.chi_squared()
     return LoopRun(
@@ -166,22 +163,31 @@ def run_other(method: str, make: Callable[[], LoopCloser], drive: Drive, mapper:
     seconds = time.process_time() - begin
     pairs = [(loop.T_target_source, se3.inverse(true[loop.target]) @ true[loop.source])
              for loop in found]
-    metres = np.array([translation_error_m(*pair) for pair in pairs])
-    degrees = np.array([rotation_error_deg(*pair) for pair in pairs])
-    wrong = (metres > WRONG_M) | (degrees > WRONG_DEG)
+    metres, degrees, wrong = _judged(pairs)
     stamps_ns = [scan.stamp_ns for scan in drive]
-    revisits = _revisits(list(mapper.node_stamps_ns().values()),
-                         dict(zip(stamps_ns, true, strict=True)),
-                         dict(zip(stamps_ns, travelled_m(true), strict=True)))
+    revisits = _revisits(mapper, drive)
     closed = {stamps_ns[i] for loop, is_wrong in zip(found, wrong, strict=True) if not is_wrong
               for i in loop.scans}
     return OtherRun(method, drive.name, len(drive), len(revisits), len(revisits & closed), metres,
                     degrees, int(wrong.sum()), seconds)
 
 
-def _revisits(stamps_ns: list[int], truth: dict[int, Array], way: dict[int, float]) -> set[int]:
+def _judged(pairs: list[tuple[Array, Array]]) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """Return the errors of loops, found and true, in metres and degrees; and which are wrong."""
+    metres = np.array([translation_error_m(*pair) for pair in pairs])
+    degrees = np.array([rotation_error_deg(*pair) for pair in pairs])
+    return metres, degrees, (metres > WRONG_M) | (degrees > WRONG_DEG)
+
+
+def _revisits(mapper: Mapper, drive: Drive) -> set[int]:
     """Return the stamps of nodes at a place where an earlier node was, much earlier on the way."""
-    positions = np.array([truth[stamp][:3, 3] for stamp in stamps_ns])
+    true = drive.T_world_sensor
+    assert true is not None
+    row = {scan.stamp_ns: i for i, scan in enumerate(drive)}
+    stamps_ns = list(mapper.node_stamps_ns().values())
+    positions = true[[row[stamp] for stamp in stamps_ns], :3, 3]
+    travelled = travelled_m(true)
+    way = {stamp: travelled[row[stamp]] for stamp in stamps_ns}
     found = set()
     for i, j in cKDTree(positions).query_pairs(REVISIT_M):
         a, b = stamps_ns[i], stamps_ns[j]
