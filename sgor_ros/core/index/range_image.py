@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from ..common.products import times_transposed
 from ..scan.directions import AZIMUTHS
+from ..scan.directions import cells_and_ranges
 from ..scan.directions import ELEVATIONS
 from ..scan.directions import Rays
 
@@ -42,11 +43,9 @@ def view_overlap(ranges: NDArray[np.float32], R_other_sensor: NDArray[np.float64
     elevation = ((columns + 0.5) * BLOCK / ELEVATIONS - 0.5) * math.pi
     ways = np.column_stack((np.cos(elevation) * np.cos(azimuth),
                             np.cos(elevation) * np.sin(azimuth), np.sin(elevation)))
-    x, y, z = times_transposed(ways, R_other_sensor).T
-    turned = np.floor((np.arctan2(y, x) / (2 * math.pi) + 0.5) * AZIMUTHS / BLOCK).astype(int)
-    tilted = np.floor((np.arcsin(np.clip(z, -1, 1)) / math.pi + 0.5) * ELEVATIONS / BLOCK)
-    tilted = np.minimum(tilted, seen.shape[1] - 1).astype(int)
-    return float(seen[turned % len(seen), tilted].mean())
+    cells, _ = cells_and_ranges(times_transposed(ways, R_other_sensor).astype(np.float32))
+    turned, tilted = np.divmod(cells, ELEVATIONS)
+    return float(seen[turned // BLOCK, tilted // BLOCK].mean())
 
 
 @numba.njit(cache=True, nogil=True)

@@ -36,10 +36,15 @@ class Rays:
 
 def by_direction(points: NDArray[np.float32]) -> Rays:
     """Sort (N, 3) points, metres from the sensor, by the direction that they are seen in."""
+    return Rays(*_sorted(*cells_and_ranges(points), AZIMUTHS * ELEVATIONS))
+
+
+def cells_and_ranges(points: NDArray[np.float32]) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+    """Return the cell that each of (N, 3) points is seen in, and how far it is, metres."""
     cells = np.empty(len(points), np.int32)
     ranges = np.empty(len(points), np.float32)
     parallel_for(_look, len(points), points, cells, ranges)
-    return Rays(*_sorted(cells, ranges, AZIMUTHS * ELEVATIONS))
+    return cells, ranges
 
 
 @numba.njit(cache=True, nogil=True, inline='always')
