@@ -260,13 +260,19 @@ def test_two_floors_alike_are_hypotheses_until_what_is_driven_decides(started, t
     assert node.stop() == 0
 
 
-@pytest.mark.parametrize('hinted', [BACK, 2])
-def test_a_hint_may_be_right_or_wrong_and_nonsense_is_ignored(started, tmp_path, hinted):
+def lost_in_a_map(started, tmp_path):
+    """Return a node and its partner, the paths it will tell, and a publisher of hints."""
     known_map().save(tmp_path / 'yard')
     node, partner = started(f'map_folder:={tmp_path / "yard"}')
     paths = partner.hear(Path, '/path')
     hint = partner.node.create_publisher(PoseWithCovarianceStamped, '/initialpose', 1)
     partner.spin_until(hint.get_subscription_count)
+    return node, partner, paths, hint
+
+
+@pytest.mark.parametrize('hinted', [BACK, 2])
+def test_a_hint_may_be_right_or_wrong_and_nonsense_is_ignored(started, tmp_path, hinted):
+    node, partner, paths, hint = lost_in_a_map(started, tmp_path)
     hint.publish(in_map(truth(BACK), 'odom'))
     partner.spin_for(0.5)
     broken = in_map(truth(BACK))
@@ -286,11 +292,7 @@ def test_a_hint_may_be_right_or_wrong_and_nonsense_is_ignored(started, tmp_path,
 
 
 def test_a_hint_never_gives_a_pose_without_registration(started, tmp_path, elsewhere):
-    known_map().save(tmp_path / 'yard')
-    node, partner = started(f'map_folder:={tmp_path / "yard"}')
-    paths = partner.hear(Path, '/path')
-    hint = partner.node.create_publisher(PoseWithCovarianceStamped, '/initialpose', 1)
-    partner.spin_until(hint.get_subscription_count)
+    node, partner, paths, hint = lost_in_a_map(started, tmp_path)
     _, message, _ = partner.outcome(ros.cloud(*elsewhere[0][:2], stamp_of(1)))
     assert 'not found in the map' in message
     hint.publish(in_map(truth(3)))
